@@ -1,4 +1,8 @@
 //! Submissions of a device, between timestamps.
+//!
+//! Times of all queues of a device are those of one clock, which holds for the drivers that were measured; Vulkan promises as much for one
+//! queue alone. A submission works from the moment at which the GPU begins its first command buffer, waits for semaphores of later stages
+//! included.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -6,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use ash::vk;
 use lvk_layer::SetDeviceLoaderData;
 
-use crate::intervals::covered;
+use crate::intervals::union_length;
 
 /// A device, the functions of the layer below for it, and the submissions that were not asked for yet.
 pub(crate) struct TimedDevice {
@@ -28,6 +32,8 @@ struct State {
     /// Those of submissions that have ended, by queue family.
     idle: HashMap<u32, Vec<Timestamps>>,
     submitted: Vec<(u32, Timestamps)>,
+    /// Submissions since the last question that have no timestamps.
+    untimed: usize,
 }
 
 /// The command buffers around a submission, and the pool of their two timestamps.
@@ -38,11 +44,22 @@ struct Timestamps {
     after: vk::CommandBuffer,
 }
 
+/// What queues did since the last question.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum BusyTime {
+    /// Nothing was submitted.
+    NothingSubmitted,
+    /// A queue has no timestamps, or one could not be read.
+    NotTimed,
+    /// Milliseconds in which a queue worked.
+    Milliseconds(f64),
+}
+
 /// Returns the elements behind a pointer of a Vulkan command.
 ///
 /// # Safety
 /// There are `count` elements, unless it is 0.
-pub(crate) unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
+pub(crate) unsafe fn slice_of<'a, T>(first: *const T, count: u32) -> &'a [T] {
     // SAFETY: by contract.
     if count == 0 { &[] } else { unsafe { std::slice::from_raw_parts(first, count as usize) } }
 }
@@ -89,12 +106,12 @@ impl TimedDevice {
         fence: vk::Fence,
     ) -> vk::Result {
         let works = batches.iter().any(|batch| batch.command_buffer_count > 0);
-        let timestamps = if works { self.timestamps(queue) } else { None };
+        let timestamps = self.timestamps(queue, works);
         let mut batches = batches.to_vec();
         let mut lists: Vec<Vec<vk::CommandBuffer>> = batches
             .iter()
             // SAFETY: by contract.
-            .map(|batch| unsafe { slice(batch.p_command_buffers, batch.command_buffer_count) }.to_vec())
+            .map(|batch| unsafe { slice_of(batch.p_command_buffers, batch.command_buffer_count) }.to_vec())
             .collect();
         enclose(&mut lists, timestamps.map(|(_, times)| [times.before, times.after]));
         for (batch, list) in batches.iter_mut().zip(&lists) {
@@ -117,13 +134,13 @@ impl TimedDevice {
         fence: vk::Fence,
     ) -> vk::Result {
         let works = batches.iter().any(|batch| batch.command_buffer_info_count > 0);
-        let timestamps = if works { self.timestamps(queue) } else { None };
+        let timestamps = self.timestamps(queue, works);
         let mut batches = batches.to_vec();
         let mut lists: Vec<Vec<vk::CommandBufferSubmitInfo<'_>>> = batches
             .iter()
             .map(|batch| {
                 // SAFETY: by contract.
-                unsafe { slice(batch.p_command_buffer_infos, batch.command_buffer_info_count) }.to_vec()
+                unsafe { slice_of(batch.p_command_buffer_infos, batch.command_buffer_info_count) }.to_vec()
             })
             .collect();
         let info = |list| vk::CommandBufferSubmitInfo::default().command_buffer(list);
@@ -159,9 +176,16 @@ impl TimedDevice {
         }
     }
 
-    /// Returns the timestamps for a submission to a queue, and its family; `None` where they cannot be had.
-    fn timestamps(&self, queue: vk::Queue) -> Option<(u32, Timestamps)> {
+    /// Returns the timestamps for a submission to a queue, and its family. `None` for one without work, and where they cannot be had, which
+    /// is counted.
+    fn timestamps(&self, queue: vk::Queue, works: bool) -> Option<(u32, Timestamps)> {
         let mut state = self.state();
+        let timestamps = if works { self.find_timestamps(&mut state, queue) } else { None };
+        state.untimed += usize::from(works && timestamps.is_none());
+        timestamps
+    }
+
+    fn find_timestamps(&self, state: &mut State, queue: vk::Queue) -> Option<(u32, Timestamps)> {
         let family = *state.families.get(&queue)?;
         if self.valid_bits.get(family as usize).is_none_or(|bits| *bits == 0) {
             return None;
@@ -179,14 +203,16 @@ impl TimedDevice {
                 pool
             }
         };
-        Some((family, self.recorded(&mut state, pool)?))
+        Some((family, self.recorded(state, pool)?))
     }
 
     /// Records the command buffers around a submission. They are submitted again and again.
     fn recorded(&self, state: &mut State, pool: vk::CommandPool) -> Option<Timestamps> {
         let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
         let lists = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(2);
-        let begin = vk::CommandBufferBeginInfo::default();
+        // A timestamp can be read before its command buffer has ended.
+        let begin =
+            vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::SIMULTANEOUS_USE);
         // SAFETY: the descriptions are valid, and the lock of the state keeps the pool for this thread.
         unsafe {
             let queries = self.functions.create_query_pool(&queries, None).ok()?;
@@ -209,25 +235,36 @@ impl TimedDevice {
         }
     }
 
-    /// Returns the milliseconds in which a queue worked since the last call; `None` without a submission.
-    pub(crate) fn take_busy_time(&self) -> Option<f64> {
-        let submitted = std::mem::take(&mut self.state().submitted);
+    /// Returns what queues did since the last call. Waits for submissions that have not ended; others wait for this call.
+    pub(crate) fn take_busy_time(&self) -> BusyTime {
+        let mut state = self.state();
+        let submitted = std::mem::take(&mut state.submitted);
+        let mut untimed = std::mem::take(&mut state.untimed);
+        if submitted.is_empty() && untimed == 0 {
+            return BusyTime::NothingSubmitted;
+        }
         let mut intervals = Vec::new();
         for (family, timestamps) in submitted {
             let mut ticks = [0_u64; 2];
             let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-            // SAFETY: the submission writes both queries, and does not use them once they can be read.
+            // SAFETY: the lock keeps the device, and the submission writes both queries, which it does not use once they can be read.
             let read = unsafe {
                 let read = self.functions.get_query_pool_results(timestamps.queries, 0, &mut ticks, flags);
                 self.functions.reset_query_pool(timestamps.queries, 0, 2);
                 read
             };
-            if read.is_ok() {
-                intervals.push(ticks);
-                self.state().idle.entry(family).or_default().push(timestamps);
+            match read {
+                Ok(()) => {
+                    intervals.push(unwrapped(ticks, self.valid_bits[family as usize]));
+                    state.idle.entry(family).or_default().push(timestamps);
+                }
+                Err(_) => untimed += 1,
             }
         }
-        (!intervals.is_empty()).then(|| covered(intervals) as f64 * self.period * 1e-6)
+        match untimed {
+            0 => BusyTime::Milliseconds(union_length(intervals) as f64 * self.period * 1e-6),
+            _ => BusyTime::NotTimed,
+        }
     }
 
     /// Destroys what the layer has created, after all work.
@@ -243,7 +280,16 @@ impl TimedDevice {
                 self.functions.destroy_command_pool(pool, None);
             }
         }
+        // A question on another thread, which waited for the lock, finds nothing.
+        state.submitted.clear();
+        state.untimed = 0;
     }
+}
+
+/// Returns an interval whose end is not before its start, where the counter of so many bits has begun anew in between.
+fn unwrapped([from, to]: [u64; 2], valid_bits: u32) -> [u64; 2] {
+    let mask = u64::MAX >> (64 - valid_bits.clamp(1, 64));
+    [from, from.saturating_add(to.wrapping_sub(from) & mask)]
 }
 
 /// Puts a list before the first lists and another one behind the last.
@@ -252,5 +298,28 @@ fn enclose<T>(lists: &mut [Vec<T>], ends: Option<[T; 2]>) {
         lists[0].insert(0, before);
         let last = lists.len() - 1;
         lists[last].push(after);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{enclose, unwrapped};
+
+    #[test]
+    fn a_counter_that_begins_anew_does_not_shorten_an_interval() {
+        assert_eq!(unwrapped([10, 14], 36), [10, 14]);
+        let last = (1 << 36) - 1;
+        assert_eq!(unwrapped([last, 4], 36), [last, last + 5]);
+        assert_eq!(unwrapped([u64::MAX - 1, u64::MAX], 64), [u64::MAX - 1, u64::MAX]);
+    }
+
+    #[test]
+    fn the_first_batch_begins_and_the_last_one_ends_with_a_timestamp() {
+        let mut batches = vec![vec![1], Vec::new(), vec![2, 3], Vec::new()];
+        enclose(&mut batches, Some([8, 9]));
+        assert_eq!(batches, [vec![8, 1], vec![], vec![2, 3], vec![9]]);
+        let mut none: Vec<Vec<u8>> = Vec::new();
+        enclose(&mut none, Some([8, 9]));
+        assert_eq!(none, Vec::<Vec<u8>>::new());
     }
 }

@@ -2,11 +2,13 @@
 
 use ash::vk;
 
-/// Calls `create` with a description of a device that enables `hostQueryReset`, whatever the program's own says.
+/// Calls `create` with a description of a device that enables `hostQueryReset`, whatever the program's own says. Every device with
+/// Vulkan 1.2 has the feature.
 ///
 /// # Safety
-/// `info` is a valid description of a device.
-pub(crate) unsafe fn enabled(
+/// `info` is a valid description of a device. A structure of its chain that has the feature is in memory that can be written, and no other
+/// thread uses it.
+pub(crate) unsafe fn create_with_host_query_reset(
     info: *const vk::DeviceCreateInfo<'_>,
     create: impl FnOnce(*const vk::DeviceCreateInfo<'_>) -> vk::Result,
 ) -> vk::Result {
@@ -49,18 +51,26 @@ mod tests {
         let look = |info: *const vk::DeviceCreateInfo<'_>| {
             // SAFETY: the chains of these tests are valid.
             unsafe {
-                let first = (*info).p_next.cast::<vk::BaseInStructure<'_>>();
-                found = match (*first).s_type {
-                    vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_2_FEATURES => {
-                        (*first.cast::<vk::PhysicalDeviceVulkan12Features<'_>>()).host_query_reset
-                    }
-                    _ => (*first.cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>()).host_query_reset,
-                } == vk::TRUE;
+                let mut next = (*info).p_next.cast::<vk::BaseInStructure<'_>>();
+                while !next.is_null() {
+                    found |= vk::TRUE
+                        == match (*next).s_type {
+                            vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_2_FEATURES => {
+                                (*next.cast::<vk::PhysicalDeviceVulkan12Features<'_>>()).host_query_reset
+                            }
+                            vk::StructureType::PHYSICAL_DEVICE_HOST_QUERY_RESET_FEATURES => {
+                                (*next.cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>())
+                                    .host_query_reset
+                            }
+                            _ => vk::FALSE,
+                        };
+                    next = (*next).p_next;
+                }
             }
             vk::Result::SUCCESS
         };
         // SAFETY: the description is valid.
-        assert_eq!(unsafe { enabled(info, look) }, vk::Result::SUCCESS);
+        assert_eq!(unsafe { create_with_host_query_reset(info, look) }, vk::Result::SUCCESS);
         found
     }
 
@@ -73,5 +83,10 @@ mod tests {
         let mut own = vk::PhysicalDeviceHostQueryResetFeatures::default().host_query_reset(true);
         assert!(told(&vk::DeviceCreateInfo::default().push_next(&mut own)));
         assert_eq!(own.host_query_reset, vk::TRUE);
+        // Behind another structure, and beside another one.
+        let mut of_13 = vk::PhysicalDeviceVulkan13Features::default();
+        assert!(told(&vk::DeviceCreateInfo::default().push_next(&mut of_12).push_next(&mut of_13)));
+        assert_eq!(of_12.host_query_reset, vk::FALSE);
+        assert!(told(&vk::DeviceCreateInfo::default().push_next(&mut of_13)));
     }
 }

@@ -1,7 +1,7 @@
 //! A Vulkan layer that measures how long the GPU works for a program, whichever library submits the work.
 //!
 //! Each submission gets a command buffer with a timestamp before its own, and one behind them. The program opens the library that the
-//! loader has opened, and asks [`take_busy_time`] for the time of the submissions since its last question.
+//! loader has opened, and asks [`take_busy_time`] for the time of the submissions since its last question. The program asks for Vulkan 1.3.
 
 mod device;
 mod host_query_reset;
@@ -15,10 +15,14 @@ use ash::vk;
 use ash::vk::Handle;
 use lvk_layer::{DEVICE_LINK, INSTANCE_LINK, Negotiation, find_link, find_set_loader_data};
 
-use device::TimedDevice;
+use device::{BusyTime, TimedDevice};
 
 /// Name of the function that programs ask for the time.
 pub const TAKE_BUSY_TIME: &str = "lvk_gpu_timer_take_busy_time";
+/// Answer of [`take_busy_time`]: nothing was submitted since the last question.
+pub const NOTHING_SUBMITTED: f64 = -1.0;
+/// Answer of [`take_busy_time`]: the time of a submission is not known, as where its queue has no timestamps.
+pub const NOT_TIMED: f64 = -2.0;
 
 /// Functions of the layer below, by the key of an instance or a device.
 type Map<T> = LazyLock<RwLock<HashMap<usize, Arc<T>>>>;
@@ -49,13 +53,21 @@ fn remove<T>(map: &Map<T>, handle: u64) -> Option<Arc<T>> {
     map.write().unwrap_or_else(PoisonError::into_inner).remove(&key)
 }
 
-/// Returns the milliseconds in which any queue of any device worked since the last call, and waits for submissions that have not ended.
-/// Negative if nothing was submitted, or if the device has no timestamps.
-#[unsafe(export_name = "lvk_gpu_timer_take_busy_time")]
+/// Returns the milliseconds in which a queue worked since the last call, as a sum over all devices; [`NOTHING_SUBMITTED`], or [`NOT_TIMED`].
+///
+/// Ask after the program has waited for its work: this call waits for submissions that have not ended, and new ones wait for this call.
+#[unsafe(export_name = "lvk_gpu_timer_take_busy_time")] // as `TAKE_BUSY_TIME`
 pub extern "C" fn take_busy_time() -> f64 {
     let devices: Vec<_> = DEVICES.read().unwrap_or_else(PoisonError::into_inner).values().cloned().collect();
-    let times: Vec<_> = devices.iter().filter_map(|device| device.take_busy_time()).collect();
-    if times.is_empty() { -1.0 } else { times.iter().sum() }
+    let mut sum = None;
+    for device in devices {
+        match device.take_busy_time() {
+            BusyTime::NothingSubmitted => {}
+            BusyTime::NotTimed => return NOT_TIMED,
+            BusyTime::Milliseconds(time) => sum = Some(sum.unwrap_or(0.0) + time),
+        }
+    }
+    sum.unwrap_or(NOTHING_SUBMITTED)
 }
 
 /// Exchanges versions and functions with the loader.
@@ -121,14 +133,14 @@ unsafe extern "system" fn create_device(
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
         let set_loader_data = find_set_loader_data((*info).p_next);
-        let Some(get_proc_addr) = (*(*link).link).other else {
+        let Some(get_proc_addr) = (*(*link).link).get_device_proc_addr else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
         (*link).link = (*(*link).link).below;
         let create = |info: *const vk::DeviceCreateInfo<'_>| {
             (instance.functions.fp_v1_0().create_device)(physical, info, allocator, device)
         };
-        let result = host_query_reset::enabled(info, create);
+        let result = host_query_reset::create_with_host_query_reset(info, create);
         if result == vk::Result::SUCCESS {
             let find = |name: &CStr| pointer(get_proc_addr(*device, name.as_ptr()));
             let functions = ash::Device::load_with(find, *device);
@@ -186,7 +198,7 @@ unsafe extern "system" fn queue_submit(
 ) -> vk::Result {
     let Some(timed) = lookup(&DEVICES, queue.as_raw()) else { return vk::Result::ERROR_DEVICE_LOST };
     // SAFETY: the arguments are the caller's.
-    unsafe { timed.submit(queue, device::slice(batches, count), fence) }
+    unsafe { timed.submit(queue, device::slice_of(batches, count), fence) }
 }
 
 unsafe extern "system" fn queue_submit2(
@@ -197,7 +209,7 @@ unsafe extern "system" fn queue_submit2(
 ) -> vk::Result {
     let Some(timed) = lookup(&DEVICES, queue.as_raw()) else { return vk::Result::ERROR_DEVICE_LOST };
     // SAFETY: the arguments are the caller's.
-    unsafe { timed.submit2(queue, device::slice(batches, count), fence) }
+    unsafe { timed.submit2(queue, device::slice_of(batches, count), fence) }
 }
 
 fn pointer(function: vk::PFN_vkVoidFunction) -> *const std::ffi::c_void {

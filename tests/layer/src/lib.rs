@@ -1,8 +1,13 @@
-//! Structures of the interface between the Vulkan loader and layers, which `ash` does not have.
+//! Structures of the interface between the Vulkan loader and layers, which `ash` does not have, and the folder by which the loader finds
+//! a layer.
+
+mod folder;
 
 use std::ffi::c_void;
 
 use ash::vk;
+
+pub use folder::{LayerDescription, LayerFolder};
 
 /// `VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO`.
 pub const INSTANCE_LINK: vk::StructureType = vk::StructureType::LOADER_INSTANCE_CREATE_INFO;
@@ -21,8 +26,8 @@ pub struct Link {
     pub below: *mut Link,
     /// `vkGetInstanceProcAddr` of the layer below.
     pub get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
-    /// `vkGetDeviceProcAddr` in the description of a device; something else in that of an instance.
-    pub other: Option<vk::PFN_vkGetDeviceProcAddr>,
+    /// `vkGetDeviceProcAddr` of the layer below in the description of a device; another function in that of an instance.
+    pub get_device_proc_addr: Option<vk::PFN_vkGetDeviceProcAddr>,
 }
 
 /// `VkLayerInstanceCreateInfo` and `VkLayerDeviceCreateInfo`.

@@ -5,8 +5,9 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
+use lvk_layer::LayerFolder;
+
 use super::answer::{Answer, one_line};
-use super::gpu_timer::GpuTimer;
 use super::peer::{Failure, PeerDevice, Sample};
 use super::serve::{GPU_TIME, MEMORY, RESULT, SAMPLE};
 
@@ -25,7 +26,7 @@ impl Launch {
     ///
     /// # Errors
     /// The reason that the child gives, or how it ended.
-    pub(super) fn start(&self, args: &[String], timer: Option<&GpuTimer>) -> Result<PeerProcess, Failure> {
+    pub(super) fn start(&self, args: &[String], timer: Option<&LayerFolder>) -> Result<PeerProcess, Failure> {
         let mut command = Command::new(&self.program);
         command.args(self.subcommand).args(args);
         if let Some(timer) = timer {
@@ -94,11 +95,14 @@ impl PeerProcess {
         }
     }
 
-    /// Takes a sample, and returns the milliseconds in which the GPU worked for it. `None` without a timer, or where nothing was submitted.
-    pub(super) fn gpu_time(&mut self) -> Result<Option<f64>, Failure> {
+    /// Takes a sample, and returns the milliseconds in which the GPU worked for it.
+    pub(super) fn gpu_time(&mut self) -> Result<f64, Failure> {
         self.take_gpu_time()?;
         self.sample()?;
-        self.take_gpu_time()
+        // A loader that did not find the layer opens none, and the library of the child knows no device.
+        Ok(self
+            .take_gpu_time()?
+            .ok_or("the layer saw no submission: the loader did not find it, or there was none")?)
     }
 
     fn take_gpu_time(&mut self) -> Result<Option<f64>, Failure> {

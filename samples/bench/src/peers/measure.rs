@@ -4,11 +4,12 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_layer::LayerFolder;
 
 use super::args::{PeersArgs, WorkClass};
 use super::child::{Launch, PeerProcess};
 use super::cold_build::cold_build;
-use super::gpu_timer::GpuTimer;
+use super::gpu_timer::timer_layer;
 use super::peer::{Failure, PeerEntry, Sample};
 use super::report::{Measured, Report};
 use super::row::Row;
@@ -19,7 +20,7 @@ const WARM_UP_ROUNDS: u32 = 2;
 /// Time after which a row ends, once it has [`FEWEST_ROUNDS`].
 const LONGEST_ROW: Duration = Duration::from_secs(25);
 /// Rounds that a row has at least.
-const FEWEST_ROUNDS: usize = 3;
+const FEWEST_ROUNDS: u32 = 3;
 
 /// Options that are not those of the comparison alone.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -101,15 +102,15 @@ fn measure(
     let device = probe.device.name.clone();
     let mut report = Report::new(entries, &device, rounds, options.quick || options.validate);
     drop(probe);
-    let timer = GpuTimer::new()?;
-    let run = Rounds { entries, args, launch, timer: &timer, device: &device, class, rounds };
+    let timer = timer_layer().map_err(|error| report.add_note(format!("no time of the GPU: {error}"))).ok();
+    let run = Rounds { entries, args, launch, device: &device, class, rounds };
     let [opened, memory] = run.opened();
     report.add_times("context created", 1, true, opened);
     for row in args.selected() {
         eprintln!("measuring {} ...", row.key());
         let mut measured = run.row(row);
-        if !row.is_cpu_only() {
-            run.add_gpu_times(row, &mut measured);
+        if let (Some(timer), false) = (&timer, row.is_cpu_only()) {
+            run.add_gpu_times(row, timer, &mut measured);
         }
         report.add_times(&row.title(&work), row.items(&work), row.is_cpu_only(), measured);
     }
@@ -129,7 +130,6 @@ struct Rounds<'a> {
     entries: &'a [PeerEntry],
     args: &'a PeersArgs,
     launch: &'a Launch,
-    timer: &'a GpuTimer,
     /// Name of the first peer's device, with its driver.
     device: &'a str,
     class: WorkClass,
@@ -163,44 +163,48 @@ impl Rounds<'_> {
         Ok((process.opened_ms, process.memory()?))
     }
 
+    /// Gives each peer its turn in every round, of which the first ones do not count, until the row takes too long. `turn` gets the number
+    /// of a peer, and whether the round counts.
+    fn take_turns(&self, rounds: u32, mut turn: impl FnMut(usize, bool)) {
+        let (began, warm_up, count) = (Instant::now(), WARM_UP_ROUNDS.min(rounds), self.entries.len());
+        for round in 0..warm_up + rounds {
+            for place in 0..count {
+                turn((place + round as usize) % count, round >= warm_up);
+            }
+            if began.elapsed() > LONGEST_ROW && round + 1 >= warm_up + FEWEST_ROUNDS {
+                break;
+            }
+        }
+    }
+
     /// Measures a row. The children live until the row ends.
     fn row(&self, row: Row) -> Vec<Measured> {
         let mut peers: Vec<_> = self.entries.iter().map(|entry| self.running(entry, row)).collect();
-        let (began, warm_up) = (Instant::now(), WARM_UP_ROUNDS.min(self.rounds));
-        for round in 0..warm_up + self.rounds {
-            for turn in 0..peers.len() {
-                let which = (turn + round as usize) % peers.len();
-                peers[which].sample(round >= warm_up);
-            }
-            let running = peers.iter().filter(|peer| peer.process.is_some());
-            let fewest = running.map(|peer| peer.measured.samples.len()).min();
-            if began.elapsed() > LONGEST_ROW && fewest.is_none_or(|fewest| fewest >= FEWEST_ROUNDS) {
-                break;
-            }
-        }
+        self.take_turns(self.rounds, |which, counts| peers[which].sample(counts));
         peers.into_iter().map(RunningPeer::finish).collect()
     }
 
-    /// Measures the GPU time of a row, in rounds of its own: the timer takes time of the CPU. Peers that fail have none.
-    fn add_gpu_times(&self, row: Row, measured: &mut [Measured]) {
-        let timed = |entry| self.start(entry, row, self.class, Some(self.timer)).ok();
-        let mut peers: Vec<_> = self.entries.iter().map(timed).collect();
-        let rounds = self.rounds.div_ceil(2);
-        let (began, warm_up) = (Instant::now(), WARM_UP_ROUNDS.min(rounds));
-        for round in 0..warm_up + rounds {
-            for turn in 0..peers.len() {
-                let which = (turn + round as usize) % peers.len();
-                let time = peers[which].as_mut().map_or(Ok(None), PeerProcess::gpu_time);
-                match time {
-                    Ok(time) if round >= warm_up => measured[which].gpu.extend(time),
-                    Ok(_) => {}
-                    Err(_) => peers[which] = None,
+    /// Measures the GPU time of a row, in rounds of its own: the timer takes time of the CPU.
+    fn add_gpu_times(&self, row: Row, timer: &LayerFolder, measured: &mut [Measured]) {
+        let start = |(entry, measured): (&PeerEntry, &mut Measured)| {
+            if measured.reason.is_some() {
+                return None;
+            }
+            let started = self.start(entry, row, self.class, Some(timer));
+            started.map_err(|reason| measured.fail_gpu(&*reason)).ok()
+        };
+        let mut peers: Vec<_> = self.entries.iter().zip(measured.iter_mut()).map(start).collect();
+        self.take_turns(self.rounds.div_ceil(2), |which, counts| {
+            let Some(process) = &mut peers[which] else { return };
+            match process.gpu_time() {
+                Ok(time) if counts => measured[which].gpu.push(time),
+                Ok(_) => {}
+                Err(reason) => {
+                    measured[which].fail_gpu(&*reason);
+                    peers[which] = None;
                 }
             }
-            if began.elapsed() > LONGEST_ROW && round as usize >= warm_up as usize + FEWEST_ROUNDS {
-                break;
-            }
-        }
+        });
     }
 
     /// Starts a child. All have to open the same device.
@@ -209,7 +213,7 @@ impl Rounds<'_> {
         entry: &PeerEntry,
         row: Row,
         class: WorkClass,
-        timer: Option<&GpuTimer>,
+        timer: Option<&LayerFolder>,
     ) -> Result<PeerProcess, Failure> {
         let process = self.launch.start(&self.args.child(entry.name, row, class), timer)?;
         let name = &process.device.name;

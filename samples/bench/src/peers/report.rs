@@ -22,6 +22,8 @@ pub(super) struct Measured {
     pub(super) result: Option<f64>,
     /// Why there are no samples.
     pub(super) reason: Option<String>,
+    /// Why there are samples, but no GPU times.
+    pub(super) gpu_reason: Option<String>,
 }
 
 impl Measured {
@@ -29,6 +31,12 @@ impl Measured {
     pub(super) fn fail(&mut self, reason: &dyn std::error::Error) {
         self.samples.clear();
         self.reason.get_or_insert_with(|| reason.to_string());
+    }
+
+    /// Discards the GPU times, for this reason.
+    pub(super) fn fail_gpu(&mut self, reason: &dyn std::error::Error) {
+        self.gpu.clear();
+        self.gpu_reason.get_or_insert_with(|| reason.to_string());
     }
 }
 
@@ -101,17 +109,25 @@ impl Report {
         }
         for (peer, measured) in self.peers.clone().into_iter().zip(&measured) {
             if let Some(reason) = &measured.reason {
-                self.add_reason(reason, peer, title);
+                self.add_reason(reason, peer, title.to_owned());
+            }
+            if let Some(reason) = &measured.gpu_reason {
+                self.add_reason(reason, peer, format!("GPU time of {title}"));
             }
         }
         self.compare_results(title, &measured);
     }
 
-    fn add_reason(&mut self, reason: &str, peer: &'static str, title: &str) {
+    /// Adds a line below the table.
+    pub(super) fn add_note(&mut self, note: String) {
+        self.table.add_note(note);
+    }
+
+    fn add_reason(&mut self, reason: &str, peer: &'static str, title: String) {
         let known = self.reasons.iter_mut().find(|(text, of, _)| text == reason && *of == peer);
         match known {
-            Some((_, _, titles)) => titles.push(title.to_owned()),
-            None => self.reasons.push((reason.to_owned(), peer, vec![title.to_owned()])),
+            Some((_, _, titles)) => titles.push(title),
+            None => self.reasons.push((reason.to_owned(), peer, vec![title])),
         }
     }
 
@@ -201,7 +217,7 @@ mod tests {
     fn measured(times: &[f64], result: Option<f64>) -> Measured {
         let samples = times.iter().map(|&time| Sample { cpu: time, done: 2.0 * time }).collect();
         let gpu = times.iter().map(|&time| 0.5 * time).collect();
-        Measured { samples, gpu, result, reason: None }
+        Measured { samples, gpu, result, ..Measured::default() }
     }
 
     #[test]
@@ -223,6 +239,9 @@ mod tests {
         failed.fail(&*Failure::from("no such feature"));
         report.add_times("other", 1, true, vec![measured(&[1.0], None), failed.clone()]);
         report.add_times("third", 1, true, vec![measured(&[1.0], None), failed]);
+        let mut untimed = measured(&[1.0], None);
+        untimed.fail_gpu(&*Failure::from("no timestamps"));
+        report.add_times("fourth", 1, false, vec![measured(&[1.0], None), untimed]);
         report.add_memory(vec![measured(&[20.0], None), measured(&[25.0], None)]);
         let program = Program { label: "a", dependencies: "", files: &[] };
         report.add_build(&program, Ok(BuildTime { seconds: 61.2, cpu_seconds: Some(99.6) }));
@@ -235,6 +254,7 @@ mod tests {
             "1.00 ms (0.50; 0.50-0.50)",
             "GPU | 1.00 ms |  500 us (0.50; 0.50-0.50)",
             "lvk cannot: other; third: no such feature",
+            "lvk cannot: GPU time of fourth: no timestamps",
             "DIFFERENT: two items: the result of lvk is 7, not 8",
             "50.0 MB (1.25; 1.25-1.25)",
             "a 61 s, 100 s of all cores; a 2 s; a fails: no compiler",

@@ -156,7 +156,7 @@ unsafe extern "system" fn create_device(
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
         let get_instance = (*(*link).link).get_instance_proc_addr;
-        let Some(get_device) = (*(*link).link).other else {
+        let Some(get_device) = (*(*link).link).get_device_proc_addr else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
         (*link).link = (*(*link).link).below;

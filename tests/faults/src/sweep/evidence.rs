@@ -15,9 +15,13 @@ pub(super) fn is_seen(
 ) -> bool {
     let calls = |outcome: &RunOutcome| count(outcome, |call| call.command == command);
     match instead {
+        // How often a program asks depends on the speed of the device.
+        Instead::AsksAgain if fault.span == Span::Once => is_followed_by_success(command, &found.calls),
         Instead::CallsAgain if fault.span == Span::Once => calls(found) > calls(clean),
         // Where later calls fail too, a second call fails.
-        Instead::CallsAgain => count(found, |call| call.command == command && call.fails) > 1,
+        Instead::CallsAgain | Instead::AsksAgain => {
+            count(found, |call| call.command == command && call.fails) > 1
+        }
         Instead::BeginsLater => found.unready.is_empty(),
         Instead::WaitsOtherwise => waits_otherwise(command, fault.error, &found.calls),
         Instead::RemakesSwapchain => remakes_swapchain(command, &found.calls),
@@ -27,6 +31,12 @@ pub(super) fn is_seen(
 
 fn count(outcome: &RunOutcome, counts: impl Fn(&Call) -> bool) -> usize {
     outcome.calls.iter().filter(|call| counts(call)).count()
+}
+
+/// True if a call of `command` that succeeds lies behind each one that fails.
+fn is_followed_by_success(command: &str, calls: &[Call]) -> bool {
+    let last = |fails: bool| calls.iter().rposition(|call| call.command == command && call.fails == fails);
+    last(true) < last(false)
 }
 
 /// True if no more work follows the wait of `command` that has failed, and a wait or a question about the progress of work has
@@ -80,6 +90,16 @@ mod tests {
             assert!(again(span, "vkMapMemory! vkMapMemory!"), "{span:?}");
             assert!(!again(span, "vkMapMemory vkMapMemory!"), "{span:?}");
         }
+    }
+
+    #[test]
+    fn a_question_is_asked_again_behind_the_one_that_failed() {
+        let again = |span, found: &str| seen(Instead::AsksAgain, PROGRESS, span, found, PROGRESS);
+        let [ask, fail] = [PROGRESS.to_owned(), format!("{PROGRESS}!")];
+        assert!(again(Span::Once, &format!("{fail} {ask}")));
+        assert!(!again(Span::Once, &format!("{ask} {ask} {fail}")), "more often, but not behind the failure");
+        assert!(again(Span::Unanswered, &format!("{fail} {fail}")));
+        assert!(!again(Span::Unanswered, &format!("{ask} {fail}")));
     }
 
     #[test]

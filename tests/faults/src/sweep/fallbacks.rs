@@ -18,6 +18,8 @@ pub struct Fallback {
 pub enum Instead {
     /// A further call of the command, for the same object or another one that serves as well.
     CallsAgain,
+    /// A question about the progress of work that is asked again later.
+    AsksAgain,
     /// The command buffer that was to be begun ahead is begun by the next acquisition, or not needed.
     BeginsLater,
     /// The end of a context learns in another way that its work has ended.
@@ -29,7 +31,7 @@ pub enum Instead {
 }
 
 use FaultError::{DeviceLost, DeviceMemory, HostMemory, OutOfDate, SurfaceLost};
-use Instead::{BeginsLater, CallsAgain, LosesName, RemakesSwapchain, WaitsOtherwise};
+use Instead::{AsksAgain, BeginsLater, CallsAgain, LosesName, RemakesSwapchain, WaitsOtherwise};
 
 const fn fallback(command: &'static str, errors: &'static [FaultError], instead: Instead) -> Fallback {
     Fallback { command, errors, instead }
@@ -47,7 +49,7 @@ pub const FALLBACKS: &[Fallback] = &[
     fallback("vkMapMemory", &[HostMemory, DeviceMemory], CallsAgain),
     fallback("vkCreateAccelerationStructureKHR", &[DeviceMemory], CallsAgain),
     fallback("vkQueueWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], WaitsOtherwise),
-    fallback("vkGetSemaphoreCounterValue", &[HostMemory, DeviceMemory], CallsAgain),
+    fallback("vkGetSemaphoreCounterValue", &[HostMemory, DeviceMemory], AsksAgain),
     fallback("vkSetDebugUtilsObjectNameEXT", &[HostMemory, DeviceMemory], LosesName),
     fallback("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfaceCapabilities2KHR", &[SurfaceLost], CallsAgain),

@@ -1,5 +1,7 @@
 //! Runs a program once for each fault, and judges each run.
 
+#[cfg(target_os = "linux")]
+pub mod clean_program;
 mod error_line;
 mod evidence;
 pub mod fallbacks;

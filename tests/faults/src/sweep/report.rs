@@ -3,21 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io;
-use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::clean_program::CleanProgram;
 use super::plan::SweepPlan;
-use super::run::{Caches, LayerFolder, Program, clean_run, names_of, run};
+use super::run::Program;
 use super::verdict::{Ending, Flaw, RunOutcome, flaws, leaks_on_purpose};
 use crate::fault::{Fault, PROGRESS};
 
 /// Environment variable with the number of processes at the same time.
 pub const JOBS_VARIABLE: &str = "LVK_FAULT_JOBS";
-
-/// Runs of a fault, until one reaches it.
-const TRIES: usize = 5;
 
 /// Returns the number of processes at the same time: that of the environment, or the number of cores and 2 at least.
 fn jobs() -> usize {
@@ -140,47 +137,14 @@ impl SweepReport {
     }
 }
 
-/// Runs a program with a fault, again where the fault was not reached: threads and the speed of the device change the number of calls
-/// from run to run. Returns what the last run came to, and its flaws.
-///
-/// # Errors
-/// Those of files and processes.
-pub fn run_until_reached(
-    program: &Program,
-    layer: &LayerFolder,
-    caches: &Path,
-    fault: &Fault,
-    clean: &RunOutcome,
-) -> io::Result<(RunOutcome, Vec<Flaw>)> {
-    let mut tries = 0;
-    loop {
-        let outcome = run(program, layer, caches, Some(fault))?;
-        let flaws_found = flaws(Some(fault), &outcome, clean);
-        tries += 1;
-        if outcome.reached || !flaws_found.is_empty() || tries == TRIES {
-            return Ok((outcome, flaws_found));
-        }
-    }
-}
-
 /// Runs a program without a fault, then with each fault of the plan until `budget` has passed.
 ///
 /// # Errors
 /// Those of files and processes.
 pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Result<SweepReport> {
     let start = Instant::now();
-    let (layer, caches) = (LayerFolder::new()?, tempfile::tempdir()?);
-    let empty = tempfile::tempdir()?;
-    let (clean, found_caches) = match program.caches {
-        Caches::Warm => {
-            // This run fills the caches.
-            let names = names_of(program, &layer, caches.path())?;
-            let mut clean = run(program, &layer, caches.path(), None)?;
-            clean.names.extend(names);
-            (clean, caches.path())
-        }
-        Caches::Cold => (clean_run(program, &layer, caches.path())?, empty.path()),
-    };
+    let program = CleanProgram::new(program.clone())?;
+    let clean = &program.clean;
     let commands: BTreeSet<_> = clean.calls.iter().map(|call| &call.command).collect();
     let faults = plan.faults(&clean.calls);
     let mut report = SweepReport {
@@ -189,7 +153,7 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
         planned: faults.len(),
         ..Default::default()
     };
-    let mut flaws_of_clean = flaws(None, &clean, &clean);
+    let mut flaws_of_clean = flaws(None, clean, clean);
     if clean.ending != Ending::Status(0) || clean.calls.is_empty() {
         flaws_of_clean.push(Flaw::WrongResult);
     }
@@ -204,7 +168,7 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
             if start.elapsed() > budget {
                 break;
             }
-            let (outcome, flaws_found) = run_until_reached(program, &layer, found_caches, fault, &clean)?;
+            let (outcome, flaws_found) = program.run_until_reached(fault)?;
             report.lock().unwrap_or_else(PoisonError::into_inner).add(fault, &outcome, flaws_found);
         }
         Ok(())

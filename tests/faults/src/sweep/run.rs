@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use lvk_layer::{LayerDescription, LayerFolder};
+
 use super::verdict::{Ending, NextStart, RunOutcome};
 use crate::call_log::CallLog;
 use crate::fault::{Fault, Span};
@@ -46,65 +48,23 @@ pub enum Caches {
     Cold,
 }
 
-/// A folder with the description of the layer, in which the Vulkan loader searches.
-pub struct LayerFolder {
-    folder: tempfile::TempDir,
-}
-
-impl LayerFolder {
-    /// Describes the layer of this crate, the dynamic library beside the test program.
-    ///
-    /// # Errors
-    /// Those of files; `NotFound` where the library was not built.
-    pub fn new() -> io::Result<Self> {
-        let folder = tempfile::tempdir()?;
-        let layers = folder.path().join("vulkan/implicit_layer.d");
-        fs::create_dir_all(&layers)?;
-        let library = layer_library()?;
-        let description = format!(
-            r#"{{ "file_format_version": "1.2.1", "layer": {{
-                "name": "VK_LAYER_LVK_faults", "type": "GLOBAL", "library_path": "{}",
-                "api_version": "1.4.300", "implementation_version": "1", "description": "Makes calls fail",
-                "enable_environment": {{ "LVK_FAULT_LAYER": "1" }},
-                "disable_environment": {{ "LVK_NO_FAULT_LAYER": "1" }},
-                "pre_instance_functions": {{
-                    "vkEnumerateInstanceVersion": "lvk_fault_instance_version",
-                    "vkEnumerateInstanceExtensionProperties": "lvk_fault_instance_extensions",
-                    "vkEnumerateInstanceLayerProperties": "lvk_fault_instance_layers" }} }} }}"#,
-            library.display()
-        );
-        fs::write(layers.join("lvk_faults.json"), description)?;
-        Ok(Self { folder })
-    }
-}
-
-/// Finds the newest `liblvk_faults.so` beside the running program or in the folder above.
-fn layer_library() -> io::Result<PathBuf> {
-    let program = std::env::current_exe()?;
-    let folders = program.ancestors().skip(1).take(2);
-    let found = folders.map(|folder| folder.join("liblvk_faults.so")).filter(|path| path.exists());
-    let newest = found.max_by_key(|path| path.metadata().and_then(|data| data.modified()).ok());
-    newest.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "liblvk_faults.so was not built"))
-}
-
-/// Runs the program without a fault, and once more to read the names that it gives to objects for a tool. Fills `caches`.
+/// Describes the layer of this crate to the Vulkan loader.
 ///
 /// # Errors
-/// Those of files and processes.
-pub fn clean_run(program: &Program, layer: &LayerFolder, caches: &Path) -> io::Result<RunOutcome> {
-    let mut clean = run(program, layer, caches, None)?;
-    clean.names.extend(names_of(program, layer, caches)?);
-    Ok(clean)
-}
-
-/// Runs the program without a fault for a tool that reads names, and fills `caches`. Returns the names of its objects.
-///
-/// # Errors
-/// Those of files and processes.
-pub fn names_of(program: &Program, layer: &LayerFolder, caches: &Path) -> io::Result<BTreeSet<String>> {
-    let mut named = program.clone();
-    named.variables.push((NAMES_VARIABLE.to_owned(), "1".to_owned()));
-    Ok(run(&named, layer, caches, None)?.names)
+/// Those of files; `NotFound` where the library was not built.
+pub fn fault_layer() -> io::Result<LayerFolder> {
+    LayerFolder::new(&LayerDescription {
+        name: "VK_LAYER_LVK_faults",
+        description: "Makes calls fail",
+        library: "lvk_faults",
+        enabled_by: "LVK_FAULT_LAYER",
+        disabled_by: "LVK_NO_FAULT_LAYER",
+        pre_instance_functions: &[
+            ("vkEnumerateInstanceVersion", "lvk_fault_instance_version"),
+            ("vkEnumerateInstanceExtensionProperties", "lvk_fault_instance_extensions"),
+            ("vkEnumerateInstanceLayerProperties", "lvk_fault_instance_layers"),
+        ],
+    })
 }
 
 /// Runs the program. Without a fault it uses `caches` itself and fills them. With one it uses a
@@ -145,7 +105,7 @@ fn run_in(
     let stderr = fs::File::create(folder.join("stderr"))?;
     let mut command = Command::new(&program.path);
     command.arg(&out).args(&program.args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
-    command.env("XDG_DATA_HOME", layer.folder.path()).env("LVK_FAULT_LAYER", "1");
+    layer.enable(&mut command);
     command
         .env("LVK_CACHE", used)
         .env(LOG_VARIABLE, &log)

@@ -2,9 +2,9 @@
 
 use lvk_faults::fault::{FaultError, PROGRESS, Span};
 use lvk_faults::fault_report::{DESCRIPTION, FaultReport, REPORT_VARIABLE};
+use lvk_faults::sweep::clean_program::CleanProgram;
 use lvk_faults::sweep::plan::SweepPlan;
-use lvk_faults::sweep::report::run_until_reached;
-use lvk_faults::sweep::run::{LayerFolder, Program, clean_run};
+use lvk_faults::sweep::run::Program;
 
 use crate::{assert_told, error_line, in_window, program, some, varies};
 
@@ -17,12 +17,11 @@ fn reporting(program: Program, report: FaultReport) -> Program {
 /// Loses the device in each call that may lose it. Each error must have the driver's report, if there was a device.
 fn assert_losses_are_explained(line: &str, program: Program, plan: &SweepPlan) {
     let program = reporting(program, FaultReport::Complete);
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let clean = clean_run(&program, &layer, caches.path()).unwrap();
+    let program = CleanProgram::new(program).unwrap();
     let description = DESCRIPTION.to_str().unwrap();
-    let (mut explained, faults) = (0, plan.faults(&clean.calls));
+    let (mut explained, faults) = (0, plan.faults(&program.clean.calls));
     for fault in &faults {
-        let (outcome, flaws) = run_until_reached(&program, &layer, caches.path(), fault, &clean).unwrap();
+        let (outcome, flaws) = program.run_until_reached(fault).unwrap();
         assert_eq!(flaws, [], "{line}, {fault}: {}", outcome.stderr);
         assert!(outcome.reached || varies(line) || fault.command == PROGRESS, "{line}, {fault}: not reached");
         let has_failed = outcome.reached && outcome.result.is_none() && fault.command != "vkCreateDevice";

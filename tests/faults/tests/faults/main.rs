@@ -11,10 +11,10 @@ use std::path::PathBuf;
 
 use lvk::{Context, ContextDesc};
 use lvk_dev_driver::{DriverRequest, VirtualDisplay, prepare, virtual_display};
+use lvk_faults::sweep::clean_program::CleanProgram;
 use lvk_faults::sweep::plan::SweepPlan;
-use lvk_faults::sweep::run::{Caches, LayerFolder, Program, clean_run, run};
-use lvk_faults::sweep::verdict::{RunOutcome, flaws};
-use tempfile::TempDir;
+use lvk_faults::sweep::run::{Caches, Program};
+use lvk_faults::sweep::verdict::RunOutcome;
 use x11rb::rust_connection::RustConnection;
 
 /// A scene of six triangles: a floor, a mirror behind and a pane of glass before it.
@@ -34,6 +34,12 @@ fn validated(line: &str) -> Program {
         false => program.variables.push(("LVK_FAULT_VALIDATE".to_owned(), "1".to_owned())),
     }
     program
+}
+
+/// Asserts that a program which [`validated`] returns has the validation layer: the library listens to its messages.
+fn assert_validated(line: &str) {
+    let listens = clean(validated(line)).count("vkCreateDebugUtilsMessengerEXT");
+    assert!(listens > 0, "{line} runs without the validation layer");
 }
 
 /// True for programs whose number of calls differs from run to run, by the order of threads or the time of a window, so that a
@@ -84,39 +90,22 @@ fn some(most: usize) -> SweepPlan {
     SweepPlan { most, ..SweepPlan::full() }
 }
 
-/// A program, and its run without a fault.
-struct CleanProgram {
-    program: Program,
-    layer: LayerFolder,
-    caches: TempDir,
-    clean: RunOutcome,
-}
-
-impl CleanProgram {
-    fn new(program: Program) -> Self {
-        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-        let clean = clean_run(&program, &layer, caches.path()).unwrap();
-        Self { program, layer, caches, clean }
-    }
-
-    /// Asserts that a fault is reached, and has no flaws. Returns what was found.
-    fn assert_told(&self, fault: &str) -> RunOutcome {
-        let parsed = fault.parse().unwrap();
-        let outcome = run(&self.program, &self.layer, self.caches.path(), Some(&parsed)).unwrap();
-        assert!(outcome.reached, "{fault}");
-        assert_eq!(flaws(Some(&parsed), &outcome, &self.clean), [], "{fault}: {}", outcome.stderr);
-        outcome
-    }
-
-    /// Returns the number of calls of a command without a fault.
-    fn count(&self, command: &str) -> usize {
-        self.clean.calls.iter().filter(|call| call.command == command).count()
-    }
+/// Asserts that a fault of a program is reached, and has no flaws. Returns what was found.
+fn assert_reached(program: &CleanProgram, fault: &str) -> RunOutcome {
+    let (outcome, flaws) = program.run(&fault.parse().unwrap()).unwrap();
+    assert!(outcome.reached, "{fault}");
+    assert_eq!(flaws, [], "{fault}: {}", outcome.stderr);
+    outcome
 }
 
 /// Asserts that a fault of a program is reached, and has no flaws. Returns what was found.
 fn assert_told(program: Program, fault: &str) -> RunOutcome {
-    CleanProgram::new(program).assert_told(fault)
+    assert_reached(&clean(program), fault)
+}
+
+/// Returns a program with its run without a fault.
+fn clean(program: Program) -> CleanProgram {
+    CleanProgram::new(program).unwrap()
 }
 
 /// Returns the error of a run.

@@ -3,34 +3,34 @@
 use std::collections::BTreeSet;
 
 use lvk_faults::sweep::plan::SweepPlan;
-use lvk_faults::sweep::run::{LayerFolder, Program, run};
+use lvk_faults::sweep::run::{Program, fault_layer, run};
 use lvk_faults::sweep::verdict::{Ending, Flaw, RunOutcome, flaws};
 
-use crate::{CleanProgram, assert_told, error_line, in_window, program, validated};
+use crate::{assert_reached, assert_told, clean, error_line, in_window, program, validated};
 
 /// Faults that a whole sweep found once (docs/defects.md).
 #[test]
 fn faults_that_had_flaws_have_none() {
     assert_told(program("queues"), "vkQueueWaitIdle 1 device-memory stays");
-    let blas = CleanProgram::new(program("blas"));
+    let blas = clean(program("blas"));
     for fault in ["vkGetQueryPoolResults 1 device-lost once", "vkCreateQueryPool 1 host-memory once"] {
-        blas.assert_told(fault);
+        assert_reached(&blas, fault);
     }
     let Some((_connection, _display, program)) = in_window() else { return };
-    let program = CleanProgram::new(program);
+    let program = clean(program);
     for fault in [
         "vkGetFenceStatus 1 device-lost once",
         "vkGetPhysicalDeviceSurfaceSupportKHR 1 host-memory once",
         "vkCreateXcbSurfaceKHR 1 host-memory once",
     ] {
-        program.assert_told(fault);
+        assert_reached(&program, fault);
     }
 }
 
 /// Shortages in questions about what a driver supports are no lack of support.
 #[test]
 fn shortages_in_questions_are_no_lack_of_support() {
-    let interop = CleanProgram::new(program("interop"));
+    let interop = clean(program("interop"));
     for command in
         ["vkGetPhysicalDeviceImageFormatProperties2", "vkGetPhysicalDeviceCalibrateableTimeDomainsKHR"]
     {
@@ -38,7 +38,7 @@ fn shortages_in_questions_are_no_lack_of_support() {
         assert!(count > 1, "{command}: {count}");
         for number in 1..=count {
             // The verdict asks for the command where the run fails.
-            interop.assert_told(&format!("{command} {number} host-memory once"));
+            assert_reached(&interop, &format!("{command} {number} host-memory once"));
         }
     }
 }
@@ -54,10 +54,10 @@ fn commands_of_few_programs_fail_as_others_do() {
     ];
     let mut reached = BTreeSet::new();
     for line in [hybrid, "interop"] {
-        let program = CleanProgram::new(program(line));
+        let program = clean(program(line));
         let of_few = SweepPlan::full().faults(&program.clean.calls).into_iter();
         for fault in of_few.filter(|fault| few.contains(&&*fault.command)) {
-            program.assert_told(&fault.to_string());
+            assert_reached(&program, &fault.to_string());
             reached.insert(fault.command);
         }
     }
@@ -98,16 +98,16 @@ fn leaks(outcome: &RunOutcome) -> bool {
 #[test]
 fn shortages_after_the_picture_are_errors() {
     let line = "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2 --method pathtrace";
-    let program = CleanProgram::new(program(line));
+    let program = clean(program(line));
     let last = program.count("vkQueueSubmit2");
-    let outcome = program.assert_told(&format!("vkQueueSubmit2 {last} device-memory once"));
+    let outcome = assert_reached(&program, &format!("vkQueueSubmit2 {last} device-memory once"));
     assert!(outcome.result.is_some() && outcome.ending == Ending::Status(1), "{}", outcome.stderr);
 }
 
 /// Objects of calls that create nothing: recording, submission and waits.
 #[test]
 fn errors_of_recording_submission_and_waits_name_the_object() {
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (layer, caches) = (fault_layer().unwrap(), tempfile::tempdir().unwrap());
     for (command, object) in [
         ("vkResetCommandPool", "command buffer of the graphics queue"),
         ("vkBeginCommandBuffer", "command buffer of the graphics queue"),
@@ -126,7 +126,7 @@ fn errors_of_recording_submission_and_waits_name_the_object() {
 /// The layer sees objects that are not destroyed, and the process what else it holds.
 #[test]
 fn what_a_scenario_forgets_is_seen() {
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (layer, caches) = (fault_layer().unwrap(), tempfile::tempdir().unwrap());
     let ran = |line| run(&program(line), &layer, caches.path(), None).unwrap();
     let (clean, forgetful) = (ran("leak remembers"), ran("leak forgets"));
     assert_eq!(flaws(None, &clean, &clean), [], "{}", clean.stderr);
@@ -141,7 +141,7 @@ fn what_a_scenario_forgets_is_seen() {
 /// The layer of the faults lies above the validation layer, which sees what the library does.
 #[test]
 fn a_mistake_of_a_scenario_is_a_validation_message() {
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (layer, caches) = (fault_layer().unwrap(), tempfile::tempdir().unwrap());
     let outcome = run(&validated("leak forgets"), &layer, caches.path(), None).unwrap();
     let found = flaws(None, &outcome, &outcome);
     let is_message =
@@ -152,7 +152,7 @@ fn a_mistake_of_a_scenario_is_a_validation_message() {
 /// Faults are injected, and told by the name of the call; a library that goes on without ray tracing needs a device, too.
 #[test]
 fn a_fault_at_the_creation_of_the_device_is_told() {
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (layer, caches) = (fault_layer().unwrap(), tempfile::tempdir().unwrap());
     for (error, text) in [("host-memory", "out of host memory"), ("device-lost", "lost")] {
         let fault = format!("vkCreateDevice 1 {error} stays").parse().unwrap();
         let outcome = run(&program("queues"), &layer, caches.path(), Some(&fault)).unwrap();
@@ -164,8 +164,8 @@ fn a_fault_at_the_creation_of_the_device_is_told() {
 /// The layer stays loaded, so that a fault that is to happen once does not hit the second try.
 #[test]
 fn a_fault_happens_once_in_a_process() {
-    let program = CleanProgram::new(program("queues"));
-    let outcome = program.assert_told("vkQueueSubmit2 2 device-lost once");
+    let program = clean(program("queues"));
+    let outcome = assert_reached(&program, "vkQueueSubmit2 2 device-lost once");
     assert_eq!((outcome.result, outcome.second_result), (None, program.clean.result));
 }
 
@@ -178,11 +178,11 @@ fn shortages_in_other_questions_are_no_answers() {
         ("yuv --width 64 --height 36 --frames 1", "vkGetPhysicalDeviceImageFormatProperties2"),
         ("yuv --width 64 --height 36 --frames 1", "vkCreatePipelineCache"),
     ] {
-        let program = CleanProgram::new(program(line));
+        let program = clean(program(line));
         let count = program.count(command);
         assert!(count > 0, "{line}: {command}");
         for number in 1..=count {
-            let outcome = program.assert_told(&format!("{command} {number} host-memory once"));
+            let outcome = assert_reached(&program, &format!("{command} {number} host-memory once"));
             let start = format!("error: out of host memory in {command} for '");
             assert!(error_line(&outcome).starts_with(&start), "{line}: {}", outcome.stderr);
         }

@@ -7,7 +7,10 @@ use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
 use lvk_faults::sweep::run::{Caches, Program};
 
-use crate::{CleanProgram, WINDOWED, error_line, in_window, program, some, validated, varies};
+use crate::{
+    WINDOWED, assert_reached, assert_validated, clean, error_line, in_window, program, some, validated,
+    varies,
+};
 
 /// Time of a sweep.
 const SAMPLE: Duration = Duration::from_secs(40);
@@ -35,7 +38,10 @@ fn some_calls_of_scenarios_fail() {
 
 #[test]
 fn some_calls_fail_above_the_validation_layer() {
-    assert_no_flaws("queues", &validated("queues"), &some(12), SAMPLE / 2);
+    for line in ["queues", "hot_reload"] {
+        assert_validated(line);
+        assert_no_flaws(line, &validated(line), &some(12), SAMPLE / 2);
+    }
 }
 
 #[test]
@@ -63,10 +69,10 @@ fn some_calls_of_a_window_fail() {
 #[test]
 fn frames_of_a_swapchain_that_stays_out_of_date_are_not_shown() {
     let Some((_connection, _display, program)) = in_window() else { return };
-    let program = CleanProgram::new(program);
+    let program = clean(program);
     for call in ["vkAcquireNextImageKHR 1", "vkAcquireNextImageKHR 2", "vkQueuePresentKHR 1"] {
         let fault = format!("{call} out-of-date stays");
-        let outcome = program.assert_told(&fault);
+        let outcome = assert_reached(&program, &fault);
         let expected = "error: the swapchain 'swapchain of the scenario' stays out of date";
         assert!(error_line(&outcome).starts_with(expected), "{fault}: {}", outcome.stderr);
     }

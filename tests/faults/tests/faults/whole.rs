@@ -11,7 +11,7 @@ use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
 use lvk_faults::sweep::run::{Caches, Program};
 
-use crate::{WINDOWED, in_window, program, validated, varies};
+use crate::{WINDOWED, assert_validated, in_window, program, validated, varies};
 
 /// Time of a full sweep.
 const WHOLE: Duration = Duration::from_secs(6 * 3600);
@@ -112,7 +112,10 @@ whole_sweeps! {
     whole_viewer_lowered: "viewer SCENE --width 64 --height 36 --frames 1 --rt pipeline --samples 2";
     whole_viewer_query: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2";
     whole_viewer_software: "viewer SCENE --width 64 --height 36 --frames 1 --rt software --samples 2";
-    whole_path_tracer: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2 --method pathtrace";
+    whole_path_tracer_pipeline: "viewer SCENE --width 64 --height 36 --frames 1 --rt hardware --samples 2 --method pathtrace";
+    whole_path_tracer_lowered: "viewer SCENE --width 64 --height 36 --frames 1 --rt pipeline --samples 2 --method pathtrace";
+    whole_path_tracer_query: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2 --method pathtrace";
+    whole_path_tracer_software: "viewer SCENE --width 64 --height 36 --frames 1 --rt software --samples 2 --method pathtrace";
     whole_blas: "blas";
     whole_blas_software: "blas_software";
     whole_threads: "threads";
@@ -143,6 +146,7 @@ macro_rules! validated_sweeps {
         #[test]
         #[ignore = "minutes: .ci/slow faults"]
         fn $test() {
+            assert_validated($line);
             whole(stringify!($test), $line, &validated($line));
         }
     )*};
@@ -151,7 +155,7 @@ macro_rules! validated_sweeps {
 validated_sweeps! {
     whole_validated_hybrid_pipeline: "hybrid --width 64 --height 36 --frames 1 --rt hardware --scene SCENE";
     whole_validated_hybrid_lowered: "hybrid --width 64 --height 36 --frames 1 --rt pipeline --scene SCENE";
-    whole_validated_viewer: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2";
+    whole_validated_viewer_query: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2";
     whole_validated_blas: "blas";
     whole_validated_blas_software: "blas_software";
     whole_validated_threads: "threads";
@@ -193,7 +197,7 @@ macro_rules! cold_sweeps {
 
 cold_sweeps! {
     whole_cold_hybrid: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
-    whole_cold_large_scene: "large_scene --width 64 --height 36 --frames 1 --rt query --triangles 2000 --copies 3 --samples 1";
+    whole_cold_large_scene_query: "large_scene --width 64 --height 36 --frames 1 --rt query --triangles 2000 --copies 3 --samples 1";
     whole_cold_rtx_hello: "rtx_hello --width 64 --height 36 --frames 1 --rt hardware";
     whole_cold_blas_software: "blas_software";
 }

@@ -8,9 +8,8 @@ use lvk::{
     BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, ContextDesc, Dependencies, Holder,
     Reloadable, ShaderFiles, ShaderModuleDesc, ShaderStage,
 };
-use lvk_dev_driver::{DriverRequest, prepare};
 
-use crate::Failure;
+use crate::{Failure, context_without_caches};
 
 const TEXT: &str = "
     #include \"value.glsl\"
@@ -25,9 +24,8 @@ pub(crate) fn reload() -> Result<Vec<u8>, Failure> {
     let (path, value) = (folder.path().join("write.comp.glsl"), folder.path().join("value.glsl"));
     fs::write(&path, TEXT)?;
     fs::write(&value, "#define VALUE 7")?;
-    let driver = prepare(&DriverRequest::default())?;
-    // Without a cache of shaders, as the texts lie in another folder in each run.
-    let ctx = Context::new(&ContextDesc { vulkan_library: driver.loader.as_deref(), ..Default::default() })?;
+    // The texts lie in another folder in each run.
+    let ctx = context_without_caches(ContextDesc::default())?;
     let mut pipeline =
         Reloadable::new(&ctx, move |ctx, files| create(ctx, files, &path))?.with_period(Duration::ZERO);
     let mut words = written(&ctx, **pipeline)?;

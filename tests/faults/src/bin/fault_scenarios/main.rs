@@ -70,16 +70,23 @@ fn scenario(name: &str) -> Option<Scenario> {
 /// Creates the context of a scenario, with caches in the folder `LVK_CACHE`, and with the validation layer where the environment has
 /// `LVK_FAULT_VALIDATE`. Its messages are printed.
 fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
-    let driver = prepare(&DriverRequest::default())?;
     let caches = std::env::var_os("LVK_CACHE").map(std::path::PathBuf::from);
-    let validates = std::env::var_os("LVK_FAULT_VALIDATE").is_some();
     let pipelines = caches.as_ref().map(|folder| folder.join("pipelines"));
-    Ok(Context::new(&ContextDesc {
-        application_name: "faults",
-        vulkan_library: driver.loader.as_deref(),
+    context_without_caches(ContextDesc {
         pipeline_cache: pipelines.as_deref(),
         shader_cache: caches.as_deref(),
         tree_cache: caches.as_deref(),
+        ..desc
+    })
+}
+
+/// Opens a context with the driver of tests and, where the environment asks for it, the validation layer.
+fn context_without_caches(desc: ContextDesc<'_>) -> Result<Context, Failure> {
+    let driver = prepare(&DriverRequest::default())?;
+    let validates = std::env::var_os("LVK_FAULT_VALIDATE").is_some();
+    Ok(Context::new(&ContextDesc {
+        application_name: "faults",
+        vulkan_library: driver.loader.as_deref(),
         validation: if validates { ValidationMode::Standard } else { ValidationMode::Off },
         ..desc
     })?)
