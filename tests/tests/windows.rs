@@ -506,7 +506,9 @@ fn invalid_swapchains_are_refused() {
     let Some((window, ctx)) = window() else { return };
     let refused = |desc: &SwapchainDesc<'_>| ctx.create_swapchain(desc).unwrap_err();
     let none = SwapchainDesc { usage: TextureUsage::empty(), debug_name: "bare", ..Default::default() };
-    assert!(refused(&none).to_string().contains("bare"));
+    let error = refused(&none);
+    assert!(matches!(error, Error::InvalidUsage { .. }), "{error:?}");
+    assert!(error.to_string().contains("bare"), "{error}");
     let profile = DeviceProfile::core_only();
     let desc = ContextDesc {
         vulkan_library: vulkan().unwrap(),

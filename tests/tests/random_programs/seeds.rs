@@ -25,7 +25,7 @@ const LOWERED_SEEDS: u64 = 60;
 /// Most programs that are tried with a model that is wrong about one kind.
 const MOST_TRIED: u64 = 60;
 /// Operations about which the model may be wrong, beside fills.
-const EFFECTS: [Kind; 17] = [
+const EFFECTS: [Kind; 18] = [
     Kind::MapBuffer,
     Kind::CreateBlasBatch,
     Kind::DrawIndexed,
@@ -42,6 +42,7 @@ const EFFECTS: [Kind; 17] = [
     Kind::BuildBlas,
     Kind::UpdateTlas,
     Kind::Trace,
+    Kind::TraceRays,
     Kind::CopyBuffer,
 ];
 /// Programs after which objects and memory are counted.
@@ -129,22 +130,26 @@ fn random_programs_do_what_the_model_says() {
             let programs = BOUNDED_SEEDS;
             assert!(total.executed > programs * LENGTH as u64 / 2, "most operations find nothing to work on");
             assert!(total.refused > 5 * programs && total.hits > 5 * programs, "errors or rays are too rare");
-            assert_eq!(unseen(&total), [], "no program has these kinds with these problems");
+            let Some(env) = Environment::new(queues) else { return };
+            assert_eq!(unseen(&total, &env), [], "no program has these kinds with these problems");
         }
     });
 }
 
-/// Returns what the bounded programs must have: every kind without a problem, and BLAS that calls and commands refuse,
-/// one by one and in lists. What needs a feature is left out.
-fn unseen(total: &Tally) -> Vec<(Kind, Option<Problem>)> {
-    const WITHOUT_PROBLEM: [Kind; 6] = [
-        Kind::CreateRays,
-        Kind::DestroyRays,
-        Kind::TraceRays,
-        Kind::DrawMesh,
-        Kind::DrawCounted,
-        Kind::WrongStructure,
-    ];
+/// True if the device has what operations of a kind need.
+fn is_supported(env: &Environment, kind: Kind) -> bool {
+    let caps = env.ctx().capabilities();
+    match kind {
+        Kind::DrawMesh => caps.mesh_shader,
+        Kind::DrawCounted => caps.has(lvk::OptionalFeature::DrawIndirectCount),
+        Kind::CreateRays | Kind::DestroyRays | Kind::TraceRays => caps.ray_tracing_pipeline,
+        _ => true,
+    }
+}
+
+/// Returns what the bounded programs must have and do not: every kind without a problem, as far as the device has what it needs, and BLAS that
+/// calls and commands refuse, one by one and in lists.
+fn unseen(total: &Tally, env: &Environment) -> Vec<(Kind, Option<Problem>)> {
     const OF_BLAS: [Kind; 10] = [
         Kind::CreateTlas,
         Kind::UpdateTlas,
@@ -157,7 +162,9 @@ fn unseen(total: &Tally) -> Vec<(Kind, Option<Problem>)> {
         Kind::ReloadBlas,
         Kind::WrongStructure,
     ];
-    let kinds = Kind::all().filter(|kind| !WITHOUT_PROBLEM.contains(kind)).map(|kind| (kind, None));
+    // A wrong structure is a problem by itself.
+    let is_wanted = |kind: &Kind| *kind != Kind::WrongStructure && is_supported(env, *kind);
+    let kinds = Kind::all().filter(is_wanted).map(|kind| (kind, None));
     let of_blas = |kind| [Problem::Stale, Problem::Foreign].map(|problem| (kind, Some(problem)));
     kinds.chain(OF_BLAS.into_iter().flat_map(of_blas)).filter(|wanted| !total.seen.contains(wanted)).collect()
 }
@@ -185,6 +192,7 @@ fn random_programs_by_lowered_pipelines_do_what_the_model_says() {
             let seeds = 2_000_000..2_000_000 + LOWERED_SEEDS;
             let Some(total) = run_seeds(lvk::QueueRequest::OwnHardware, seeds, dog) else { return };
             assert!(total.hits > LOWERED_SEEDS, "rays are too rare");
+            assert!(total.seen.contains(&(Kind::TraceRays, None)), "no pipeline is traced");
         });
     });
 }
@@ -214,13 +222,7 @@ fn a_wrong_model_is_detected_and_the_program_shrunk() {
 #[test]
 fn a_wrong_model_of_each_operation_is_detected() {
     let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
-    let caps = env.ctx().capabilities();
-    let has = |kind| match kind {
-        Kind::DrawMesh => caps.mesh_shader,
-        Kind::DrawCounted => caps.has(lvk::OptionalFeature::DrawIndirectCount),
-        _ => true,
-    };
-    let kinds: Vec<Kind> = EFFECTS.into_iter().filter(|kind| has(*kind)).collect();
+    let kinds: Vec<Kind> = EFFECTS.into_iter().filter(|kind| is_supported(&env, *kind)).collect();
     for kind in kinds {
         env.wrong_about = Some((kind, 1));
         let failing = (0..MOST_TRIED).find(|seed| run(&env, &program(*seed, LENGTH)).is_err());

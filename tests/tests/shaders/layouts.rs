@@ -141,12 +141,14 @@ fn stages_share_the_members_of_one_struct() {
     let shade = fragment("layout(offset = 8) float shade;");
     create(*first, Some(*shade)).unwrap();
     let lacking = create(*first, None).unwrap_err();
+    assert!(matches!(lacking, Error::LayoutMismatch { .. }), "{lacking:?}");
     assert!(
         lacking.to_string().ends_with("the block lacks 'shade' (4 bytes at byte 8 of the struct)"),
         "{lacking}"
     );
     let wrong = fragment("float shade; vec2 offset;");
     let error = create(*first, Some(*wrong)).unwrap_err();
+    assert!(matches!(error, Error::LayoutMismatch { .. }), "{error:?}");
     assert!(error.to_string().contains("'offset' and 'shade' are swapped"), "{error}");
     let none = module(&ctx, ShaderStage::Vertex, "void main() { gl_Position = vec4(1); }");
     let error = create(*none, None).unwrap_err();

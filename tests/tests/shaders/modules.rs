@@ -211,6 +211,7 @@ fn dispatches_are_checked() {
     let pipeline = compute_pipeline(&ctx, "layout(local_size_x = 1) in; void main() {}");
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let error = cmd.dispatch([1, 1, 1], &Dependencies::default()).unwrap_err();
+    assert!(matches!(error, Error::InvalidUsage { .. }), "{error:?}");
     assert!(error.to_string().contains("bind a compute pipeline first"), "{error}");
     cmd.bind_compute_pipeline(*pipeline).unwrap();
     let most = ctx.capabilities().limits.max_dispatch_workgroups;

@@ -133,6 +133,7 @@ fn textures_serve_only_what_their_usage_says() {
     ];
     for (dependencies, usage) in wrong {
         let error = cmd.dispatch([1, 1, 1], &dependencies).unwrap_err();
+        assert!(matches!(error, Error::InvalidUsage { .. }), "{error:?}");
         assert!(error.to_string().contains(usage), "{error}");
     }
     cmd.dispatch([1, 1, 1], &Dependencies::default()).unwrap();
