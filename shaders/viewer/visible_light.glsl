@@ -96,9 +96,13 @@ FirstLight storedFirst(uint place) {
                       frame.planes.at[planePlace(kPlaneMirroredWeight, place)].rgb);
 }
 
+// Width of the cone of a pixel by which textures are read, in pixels: antialiasing takes the mean of many places in a pixel, so that mip
+// levels may be one finer.
+const float kConeOfPixel = 0.5;
+
 Path beginPath(uvec2 pixel, inout Random random) {
     Path path = cameraPath(cameraDirection(frame.camera, pixel));
-    path.spread = frame.camera.pixelSpread;
+    path.spread = kConeOfPixel * frame.camera.pixelSpread;
     if (usesCache() && isUpdating(pixelPlace(ivec2(pixel)))) {
         beginUpdates(pixelPlace(ivec2(pixel)));
     }

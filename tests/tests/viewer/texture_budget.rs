@@ -215,7 +215,7 @@ fn a_budget_below_what_always_stays_is_refused() {
 fn frames_of_a_window_load_what_they_show_and_drop_what_they_do_not() {
     let Some(ctx) = device() else { return };
     let model = gallery();
-    let budget = 2 * MIB;
+    let budget = 3 * MIB;
     let mut viewer = viewer(&ctx, (Method::Hybrid, RayPath::Query), &model, Some(budget)).unwrap();
     viewer.configure(&ViewerConfig { is_progressive: true, ..*viewer.config() }).unwrap();
     // Right before one wall and then before another; both do not fit.
