@@ -1,7 +1,7 @@
 // Antialiasing over time: each frame sees another place in every pixel, and the picture is their mean. Where the camera moves, a mean
 // that is unlike the neighbourhood is pulled towards it, and bright light counts less, so that one bright sample does not outweigh all
-// others (Karis, "High Quality Temporal Supersampling", 2014). A still is the plain mean of
-// its newest frames: those that the filter has blurred least. `argument`: which of both planes the filter ended in.
+// others (Karis, "High Quality Temporal Supersampling", 2014). The first 64 frames of a still count alike; from then on newer ones, which
+// the filter has blurred less, count more. `argument`: which of both planes the filter ended in.
 #include "viewer/plane.glsl"
 
 const float kMostFrames = 12.0; // while the camera moves

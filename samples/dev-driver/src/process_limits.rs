@@ -8,10 +8,8 @@ use crate::error::DriverError;
 /// Bytes of address space that the software driver needs beside its threads for the scene of `hybrid`, with a reserve: on two cores 1,500 MiB
 /// were enough and 1,400 were not.
 const ADDRESS_SPACE: u64 = 1536 << 20;
-/// Bytes that a thread of the driver and one of the library need, with a reserve: 16 of each took 450 MiB more than two.
+/// Bytes that a thread of the driver and one of the library need for each core, with a reserve: 16 of each took 450 MiB more than two.
 const ADDRESS_SPACE_OF_THREAD: u64 = 64 << 20;
-/// Most threads of the driver.
-const MOST_THREADS: u64 = 32;
 /// Bytes that the largest file may have, with a reserve: 128 MiB were enough, 64 MiB were not.
 const FILE_SIZE: u64 = 256 << 20;
 
@@ -23,7 +21,7 @@ pub(crate) fn check() -> Result<(), DriverError> {
 }
 
 fn check_limits(limits: &str, cores: u64) -> Result<(), DriverError> {
-    let needed = ADDRESS_SPACE + cores.min(MOST_THREADS) * ADDRESS_SPACE_OF_THREAD;
+    let needed = ADDRESS_SPACE + cores * ADDRESS_SPACE_OF_THREAD;
     if let Some(limit) = soft_limit(limits, "Max address space").filter(|limit| *limit < needed) {
         return Err(DriverError::AddressSpace { limit, needed });
     }

@@ -286,10 +286,12 @@ impl TimedDevice {
     }
 }
 
-/// Returns an interval whose end is not before its start, where the counter of so many bits has begun anew in between.
+/// Returns an interval whose end is not before its start, where the counter of so many bits has begun anew in between. An end that is a
+/// little before its start is none of that: the interval is empty.
 fn unwrapped([from, to]: [u64; 2], valid_bits: u32) -> [u64; 2] {
     let mask = u64::MAX >> (64 - valid_bits.clamp(1, 64));
-    [from, from.saturating_add(to.wrapping_sub(from) & mask)]
+    let ticks = to.wrapping_sub(from) & mask;
+    [from, if ticks > mask / 2 { from } else { from.saturating_add(ticks) }]
 }
 
 /// Puts a list before the first lists and another one behind the last.
@@ -311,6 +313,9 @@ mod tests {
         let last = (1 << 36) - 1;
         assert_eq!(unwrapped([last, 4], 36), [last, last + 5]);
         assert_eq!(unwrapped([u64::MAX - 1, u64::MAX], 64), [u64::MAX - 1, u64::MAX]);
+        for bits in [36, 64] {
+            assert_eq!(unwrapped([14, 10], bits), [14, 14], "a clock that went back");
+        }
     }
 
     #[test]

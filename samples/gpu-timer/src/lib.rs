@@ -1,7 +1,7 @@
 //! A Vulkan layer that measures how long the GPU works for a program, whichever library submits the work.
 //!
 //! Each submission gets a command buffer with a timestamp before its own, and one behind them. The program opens the library that the
-//! loader has opened, and asks [`take_busy_time`] for the time of the submissions since its last question. The program asks for Vulkan 1.3.
+//! loader has opened, and asks [`take_busy_time`] for the time of the submissions since its last question. Programs must ask for Vulkan 1.3.
 
 mod device;
 mod host_query_reset;
@@ -59,15 +59,17 @@ fn remove<T>(map: &Map<T>, handle: u64) -> Option<Arc<T>> {
 #[unsafe(export_name = "lvk_gpu_timer_take_busy_time")] // as `TAKE_BUSY_TIME`
 pub extern "C" fn take_busy_time() -> f64 {
     let devices: Vec<_> = DEVICES.read().unwrap_or_else(PoisonError::into_inner).values().cloned().collect();
-    let mut sum = None;
-    for device in devices {
-        match device.take_busy_time() {
-            BusyTime::NothingSubmitted => {}
-            BusyTime::NotTimed => return NOT_TIMED,
-            BusyTime::Milliseconds(time) => sum = Some(sum.unwrap_or(0.0) + time),
-        }
+    // Every device is asked, so that none keeps what it did for the next call.
+    let times: Vec<_> = devices.iter().map(|device| device.take_busy_time()).collect();
+    if times.contains(&BusyTime::NotTimed) {
+        return NOT_TIMED;
     }
-    sum.unwrap_or(NOTHING_SUBMITTED)
+    let milliseconds = |time: &BusyTime| match time {
+        BusyTime::Milliseconds(time) => Some(*time),
+        BusyTime::NothingSubmitted | BusyTime::NotTimed => None,
+    };
+    let times: Vec<f64> = times.iter().filter_map(milliseconds).collect();
+    if times.is_empty() { NOTHING_SUBMITTED } else { times.iter().sum() }
 }
 
 /// Exchanges versions and functions with the loader.

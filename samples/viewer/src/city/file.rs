@@ -366,6 +366,7 @@ mod tests {
             let scale = texture.transform.unwrap().scale;
             let image = textured.images[texture.image].name.as_deref().unwrap();
             let pattern = Pattern::ALL.into_iter().find(|pattern| pattern.name() == image).unwrap();
+            assert_eq!(Surface::of_place(part.material.unwrap()).pattern(), Some(pattern), "{image}");
             assert!((scale[0] * TEXCOORDS_PER_METRE * pattern.period() - 1.0).abs() < 1e-5);
             if mesh.name.as_deref() == Some("ground") {
                 // A square: its diagonal is as long in texture coordinates.

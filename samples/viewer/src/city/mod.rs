@@ -67,7 +67,7 @@ pub struct City {
 /// Builds a city, the same on every machine and every call. It is lit by the sky and the sun of who shows it.
 ///
 /// # Errors
-/// [`CityError`] for numbers out of range, and for a file of more than 4 GiB.
+/// [`CityError`] for numbers out of range, for a file of more than 4 GiB, and for textures that cannot be encoded.
 pub fn city(config: &CityConfig) -> Result<City, CityError> {
     CityError::check("--blocks", config.blocks, 1..=CityConfig::MOST_BLOCKS)?;
     CityError::check("--kinds", config.kinds, 1..=CityConfig::MOST_KINDS)?;

@@ -52,9 +52,12 @@ impl GpuTextures {
         let streaming = budget.map(|budget| TextureStreaming::new(ctx, model, budget)).transpose()?;
         let mut all = Self { images: Vec::new(), samplers: Vec::new(), streaming, warnings: Vec::new() };
         for (place, image) in model.images.iter().enumerate() {
-            let LoadedMips { first_mip, texture, .. } = match &all.streaming {
-                Some(streaming) => streaming.load_coarsest(ctx, place)?,
-                None => LoadedMips { image: place, first_mip: 0, texture: upload::whole(ctx, image)? },
+            let (first_mip, texture) = match &all.streaming {
+                Some(streaming) => {
+                    let loaded = streaming.load_coarsest(ctx, place)?;
+                    (loaded.first_mip, loaded.texture)
+                }
+                None => (0, upload::whole(ctx, image)?),
             };
             if texture.is_none() {
                 let (format, name) = (image.data.format, image.name.as_deref().unwrap_or("image"));
