@@ -88,28 +88,42 @@ impl RawCommands {
 
     /// Submits an empty command buffer and waits for a timeline semaphore.
     pub(crate) fn submit_empty_on_timeline(&self) -> Result<(), BenchError> {
-        self.frame(|_| ()).map(|_| ())
+        self.begin_bare()?;
+        self.submit_on_timeline()?;
+        self.wait_for_timeline()
     }
 
     /// Submits the commands that `record` records and waits for a timeline semaphore. Returns the time before the wait, by its parts.
     pub(crate) fn frame(&self, record: impl FnOnce(vk::CommandBuffer)) -> Result<FrameParts, BenchError> {
-        let next = self.reached.get() + 1;
-        let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.timeline).value(next);
-        let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let (semaphores, values) = ([self.timeline], [next]);
-        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         let start = Instant::now();
         self.begin_bare()?;
         let begin = elapsed_ms(start);
         record(self.commands);
         let recorded = elapsed_ms(start);
-        self.submit_with(&signals, vk::Fence::null())?;
+        self.submit_on_timeline()?;
         let submitted = elapsed_ms(start);
+        self.wait_for_timeline()?;
+        Ok(FrameParts { begin, record: recorded - begin, submit: submitted - recorded })
+    }
+
+    /// Submits the command buffer with the next value of the timeline.
+    fn submit_on_timeline(&self) -> Result<(), BenchError> {
+        let signal =
+            vk::SemaphoreSubmitInfo::default().semaphore(self.timeline).value(self.reached.get() + 1);
+        let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        self.submit_with(&signals, vk::Fence::null())
+    }
+
+    /// Waits for the submission of [`submit_on_timeline`](Self::submit_on_timeline).
+    fn wait_for_timeline(&self) -> Result<(), BenchError> {
+        let next = self.reached.get() + 1;
+        let (semaphores, values) = ([self.timeline], [next]);
+        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore is a timeline, and its next value was submitted.
         let waited = unsafe { self.device.device.wait_semaphores(&wait, u64::MAX) };
         waited.map_err(BenchError::hand_written("vkWaitSemaphores"))?;
         self.reached.set(next);
-        Ok(FrameParts { begin, record: recorded - begin, submit: submitted - recorded })
+        Ok(())
     }
 
     fn begin(&self) -> Result<(), BenchError> {
