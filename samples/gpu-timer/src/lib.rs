@@ -13,7 +13,7 @@ use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use ash::vk;
 use ash::vk::Handle;
-use lvk_layer::{DEVICE_LINK, INSTANCE_LINK, Negotiation, find_link, find_set_loader_data};
+use lvk_layer::{DEVICE_LINK, INSTANCE_LINK, Negotiation, find_set_loader_data, take_link};
 
 use device::{BusyTime, TimedDevice};
 
@@ -90,11 +90,10 @@ unsafe extern "system" fn create_instance(
 ) -> vk::Result {
     // SAFETY: the loader passes a description with its link, and a valid pointer for the handle.
     unsafe {
-        let Some(link) = find_link((*info).p_next, INSTANCE_LINK) else {
+        let Some(link) = take_link((*info).p_next, INSTANCE_LINK) else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        let get_proc_addr = (*(*link).link).get_instance_proc_addr;
-        (*link).link = (*(*link).link).below;
+        let get_proc_addr = (*link).get_instance_proc_addr;
         let entry =
             ash::EntryFnV1_0::load(|name| pointer(get_proc_addr(vk::Instance::null(), name.as_ptr())));
         let result = (entry.create_instance)(info, allocator, instance);
@@ -131,14 +130,13 @@ unsafe extern "system" fn create_device(
     };
     // SAFETY: the loader passes a description with its link, and a valid pointer for the handle.
     unsafe {
-        let Some(link) = find_link((*info).p_next, DEVICE_LINK) else {
+        let Some(link) = take_link((*info).p_next, DEVICE_LINK) else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
         let set_loader_data = find_set_loader_data((*info).p_next);
-        let Some(get_proc_addr) = (*(*link).link).get_device_proc_addr else {
+        let Some(get_proc_addr) = (*link).get_device_proc_addr else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        (*link).link = (*(*link).link).below;
         let create = |info: *const vk::DeviceCreateInfo<'_>| {
             (instance.functions.fp_v1_0().create_device)(physical, info, allocator, device)
         };

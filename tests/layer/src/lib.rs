@@ -22,8 +22,7 @@ const DATA_CALLBACK: u32 = 1;
 /// The layer below, in the description of an instance or a device: `VkLayerInstanceLink`, `VkLayerDeviceLink`.
 #[repr(C)]
 pub struct Link {
-    /// The link of the layer below.
-    pub below: *mut Link,
+    below: *mut Link,
     /// `vkGetInstanceProcAddr` of the layer below.
     pub get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
     /// `vkGetDeviceProcAddr` of the layer below in the description of a device; another function in that of an instance.
@@ -32,21 +31,25 @@ pub struct Link {
 
 /// `VkLayerInstanceCreateInfo` and `VkLayerDeviceCreateInfo`.
 #[repr(C)]
-pub struct LinkInfo {
+struct LinkInfo {
     kind: vk::StructureType,
     next: *mut c_void,
     function: u32,
-    /// The link, in the structures that [`find_link`] returns.
-    pub link: *mut Link,
+    link: *mut Link,
 }
 
-/// Finds the loader's link in the chain of a description.
+/// Takes the link of the layer below from the chain of a description. The layer below then finds the link of the next one.
 ///
 /// # Safety
-/// `chain` is the `pNext` chain that the loader gives to a layer.
-pub unsafe fn find_link(chain: *const c_void, kind: vk::StructureType) -> Option<*mut LinkInfo> {
-    // SAFETY: by contract.
-    unsafe { find(chain, kind, LINK) }
+/// `chain` is the `pNext` chain that the loader gives to a layer, which calls this function once.
+pub unsafe fn take_link(chain: *const c_void, kind: vk::StructureType) -> Option<*const Link> {
+    // SAFETY: by contract; the structure holds a link, and the link the one of the layer below it.
+    unsafe {
+        let info = find(chain, kind, LINK)?;
+        let link = (*info).link;
+        (*info).link = (*link).below;
+        Some(link)
+    }
 }
 
 /// `PFN_vkSetDeviceLoaderData`: makes a handle that a layer has created one that the loader and other layers know.

@@ -19,7 +19,7 @@ use dispatch::{Level, Table, insert, number_of, remove, table_of};
 use injector::injector;
 pub use injector::{FAULT_VARIABLE, LOG_VARIABLE};
 use loader::{ExtensionsChain, LayersChain, VersionChain};
-use lvk_layer::{DEVICE_LINK, INSTANCE_LINK, Negotiation, find_link};
+use lvk_layer::{DEVICE_LINK, INSTANCE_LINK, Negotiation, take_link};
 pub use name_reader::NAMES_VARIABLE;
 
 /// Exchanges versions and functions with the loader.
@@ -104,11 +104,10 @@ unsafe extern "system" fn create_instance(
     }
     // SAFETY: the loader passes a description with its link, and a valid pointer for the handle.
     unsafe {
-        let Some(link) = find_link((*info).p_next, INSTANCE_LINK) else {
+        let Some(link) = take_link((*info).p_next, INSTANCE_LINK) else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        let proc_addr = (*(*link).link).get_instance_proc_addr;
-        (*link).link = (*(*link).link).below;
+        let proc_addr = (*link).get_instance_proc_addr;
         let create = address(proc_addr(vk::Instance::null(), c"vkCreateInstance".as_ptr()));
         let create = std::mem::transmute::<usize, vk::PFN_vkCreateInstance>(create);
         let result = create(info, allocator, instance);
@@ -152,14 +151,13 @@ unsafe extern "system" fn create_device(
     }
     // SAFETY: the loader passes a description with its link, and a valid pointer for the handle.
     unsafe {
-        let Some(link) = find_link((*info).p_next, DEVICE_LINK) else {
+        let Some(link) = take_link((*info).p_next, DEVICE_LINK) else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        let get_instance = (*(*link).link).get_instance_proc_addr;
-        let Some(get_device) = (*(*link).link).get_device_proc_addr else {
+        let get_instance = (*link).get_instance_proc_addr;
+        let Some(get_device) = (*link).get_device_proc_addr else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        (*link).link = (*(*link).link).below;
         let create = address(get_instance(vk::Instance::null(), c"vkCreateDevice".as_ptr()));
         let create = std::mem::transmute::<usize, vk::PFN_vkCreateDevice>(create);
         let create = |info: *const vk::DeviceCreateInfo<'_>| create(physical, info, allocator, device);
