@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::scene::noise;
+use crate::scene::{encode_srgb, noise};
 
 /// A texture of `size` x `size` texels.
 pub(super) struct Picture {
@@ -16,8 +16,8 @@ impl Picture {
         let pixels = (0..size * size).flat_map(|i| {
             let [u, v] = [i % size, i / size].map(|k| (k as f32 + 0.5) / size as f32);
             let (color, alpha) = texel(u, v);
-            let [r, g, b] = color.map(|c| encode_srgb(c.clamp(0.0, 1.0)));
-            [r, g, b, alpha.clamp(0.0, 1.0)].map(|c| (c * 255.0 + 0.5) as u8)
+            let [r, g, b] = color.map(encode_srgb);
+            [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
         });
         Self { size, pixels: pixels.collect() }
     }
@@ -83,10 +83,6 @@ impl Picture {
             ([0.95 * tone, 0.9 * tone, 0.8 * tone], if x.abs() < half || stalk { 1.0 } else { 0.0 })
         })
     }
-}
-
-fn encode_srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

@@ -54,7 +54,7 @@ pub fn display(radiance: [f32; 3]) -> [u8; 3] {
     radiance.map(|c| encode_srgb(1.0 - (-c.max(0.0)).exp()))
 }
 
-/// IEC 61966-2-1 encoding of a linear value from 0 to 1.
+/// IEC 61966-2-1 encoding of a linear value. What is below 0 is taken as 0, and what is above 1 as 1.
 #[must_use]
 pub fn encode_srgb(linear: f32) -> u8 {
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };

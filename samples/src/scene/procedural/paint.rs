@@ -122,15 +122,11 @@ fn leaves() -> Texture {
 fn painted(name: &str, color: impl Fn(f32, f32) -> Vec3) -> Texture {
     let texel = |i: u32| {
         let [u, v] = [i % SIZE, i / SIZE].map(|k| (k as f32 + 0.5) / SIZE as f32);
-        let [r, g, b] = color(u, v).to_array().map(encode_srgb_clamped);
+        let [r, g, b] = color(u, v).to_array().map(encode_srgb);
         [r, g, b, 255]
     };
     let pixels = (0..SIZE * SIZE).flat_map(texel).collect();
     Texture { name: name.to_owned(), width: SIZE, height: SIZE, pixels }
-}
-
-fn encode_srgb_clamped(linear: f32) -> u8 {
-    encode_srgb(linear.clamp(0.0, 1.0))
 }
 
 /// Distance of `x` to the nearest multiple of `step`.
