@@ -44,7 +44,7 @@ struct Timestamps {
     after: vk::CommandBuffer,
 }
 
-/// What queues did since the last question.
+/// Work of the queues since the last question.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum BusyTime {
     /// Nothing was submitted.
@@ -235,7 +235,7 @@ impl TimedDevice {
         }
     }
 
-    /// Returns what queues did since the last call. Waits for submissions that have not ended; others wait for this call.
+    /// Returns the work of the queues since the last call. Waits for submissions that have not ended; others wait for this call.
     pub(crate) fn take_busy_time(&self) -> BusyTime {
         let mut state = self.state();
         let submitted = std::mem::take(&mut state.submitted);

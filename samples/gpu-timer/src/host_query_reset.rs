@@ -45,7 +45,7 @@ pub(crate) unsafe fn create_with_host_query_reset(
 mod tests {
     use super::*;
 
-    /// What a layer below is told of the feature.
+    /// True if the layer below gets the feature in the description.
     fn told(info: &vk::DeviceCreateInfo<'_>) -> bool {
         let mut found = false;
         let look = |info: *const vk::DeviceCreateInfo<'_>| {

@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 pub struct LayerDescription<'a> {
     /// Name of the layer, as `VK_LAYER_LVK_faults`.
     pub name: &'a str,
-    /// What the layer does.
+    /// The purpose of the layer, for tools that list layers.
     pub description: &'a str,
     /// Name of the library without prefix and suffix, as `lvk_faults`. It lies beside the running program, where cargo puts it.
     pub library: &'a str,

@@ -41,7 +41,7 @@ pub enum CityError {
     Texture {
         /// Name of the image.
         name: &'static str,
-        /// What the PNG encoder says.
+        /// The error of the PNG encoder.
         why: String,
     },
 }

@@ -17,7 +17,7 @@ const TRIES: usize = 5;
 pub struct CleanProgram {
     /// The program.
     pub program: Program,
-    /// What came of its run without a fault, with the names that it gives to objects for a tool.
+    /// The outcome of its run without a fault, with the names that it gives to objects for a tool.
     pub clean: RunOutcome,
     layer: LayerFolder,
     caches: TempDir,
@@ -53,7 +53,7 @@ impl CleanProgram {
         self.clean.calls.iter().filter(|call| call.command == command).count()
     }
 
-    /// Runs the program with a fault. Returns what came of it, and its flaws.
+    /// Runs the program with a fault. Returns the outcome, and its flaws.
     ///
     /// # Errors
     /// Those of files and processes.
@@ -64,7 +64,7 @@ impl CleanProgram {
     }
 
     /// Runs the program with a fault, again where the fault was not reached: threads and the speed of the device change the number of calls
-    /// from run to run. Returns what the last run came to, and its flaws.
+    /// from run to run. Returns the outcome of the last run, and its flaws.
     ///
     /// # Errors
     /// Those of files and processes.
