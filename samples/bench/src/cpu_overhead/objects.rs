@@ -25,21 +25,25 @@ pub(super) fn measure(
         None => create_and_destroy(ctx, || buffer(ctx).map(drop)),
         Some(memory) => raw.buffers(AT_ONCE, BUFFER_BYTES, memory),
     })?;
-    let textures = interleave(workload.runs, |which| match memory(which) {
-        None => create_and_destroy(ctx, || texture(ctx).map(drop)),
+    let [ours, by_hand, driver, written] = interleave(workload.runs, |which| match memory(which) {
+        None if which == 0 => create_and_destroy(ctx, || texture(ctx).map(drop)),
+        None => raw.written_textures(AT_ONCE, Memory::Preallocated),
         Some(memory) => raw.textures(AT_ONCE, memory),
     })?;
+    let descriptor = each_us(&written) - each_us(&driver);
+    let textures = [ours, by_hand, driver];
     let [thousand] = interleave(workload.runs, |_| many_buffers(ctx))?;
     let mut rows = Vec::new();
     rows.extend(comparison_rows("buffer created + destroyed, with frees", &buffers, 0.6));
     rows.extend(comparison_rows("texture created + destroyed, with frees", &textures, 1.8));
+    rows.push(OverheadRow::new("- of it what a descriptor takes by hand", descriptor, "us", Limit::None));
     let name = "1,000 buffers of 256 B created, without a submission";
     rows.push(OverheadRow::new(name, median_of(&thousand, |ms| *ms), "ms", Limit::None));
     rows.extend(crowded_rows(setup, workload)?);
     Ok(rows)
 }
 
-/// Returns the memory of the hand-written variant; `None` for the library's turn.
+/// Returns the memory of the hand-written variant; `None` for the library's turn and those behind.
 fn memory(turn: usize) -> Option<Memory> {
     [None, Some(Memory::Allocated), Some(Memory::Preallocated)].get(turn).copied().flatten()
 }
@@ -47,12 +51,16 @@ fn memory(turn: usize) -> Option<Memory> {
 /// Returns the rows of the library, compared with hand-written Vulkan. The third sample uses preallocated memory and so
 /// measures the driver's part.
 fn comparison_rows(name: &str, samples: &[Vec<f64>; 3], limit: f64) -> [OverheadRow; 2] {
-    let [ours, by_hand, driver] =
-        samples.each_ref().map(|samples| each_ns(median_of(samples, |ms| *ms), AT_ONCE) * 1e-3);
+    let [ours, by_hand, driver] = samples.each_ref().map(|samples| each_us(samples));
     [
         OverheadRow::new(name, ours, "us", Limit::AtMost(limit)).compared_with(by_hand),
         OverheadRow::new("- library share", ours - driver, "us", Limit::None),
     ]
+}
+
+/// Returns the microseconds of one object, from milliseconds of all.
+fn each_us(samples: &[f64]) -> f64 {
+    each_ns(median_of(samples, |ms| *ms), AT_ONCE) * 1e-3
 }
 
 fn buffer(ctx: &Context) -> lvk::Result<lvk::Holder<lvk::BufferHandle>> {

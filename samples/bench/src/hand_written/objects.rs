@@ -1,5 +1,6 @@
 //! Creates and destroys buffers and images by the minimal Vulkan calls.
 
+use std::cell::Cell;
 use std::time::Instant;
 
 use gpu_allocator::vulkan::{
@@ -29,6 +30,7 @@ pub(crate) struct RawObjects {
     /// Memory of objects with [`Memory::Preallocated`].
     preallocated: Allocation,
     allocator: Allocator,
+    descriptors: Descriptors,
     device: ash::Device,
     /// Keeps the device alive.
     _ctx: Context,
@@ -56,7 +58,9 @@ impl RawObjects {
         let preallocated =
             vk::MemoryRequirements { size: 1 << 20, alignment: 1 << 16, memory_type_bits: u32::MAX };
         let preallocated = allocate(&mut allocator, preallocated, true)?;
-        Ok(Self { preallocated, allocator, device: ctx.raw_device().clone(), _ctx: ctx.clone() })
+        let device = ctx.raw_device().clone();
+        let descriptors = Descriptors::new(&device)?;
+        Ok(Self { preallocated, allocator, descriptors, device, _ctx: ctx.clone() })
     }
 
     /// Returns the milliseconds to create and destroy `count` buffers of `bytes` bytes.
@@ -67,6 +71,17 @@ impl RawObjects {
     /// Returns the milliseconds to create and destroy `count` sampled images of 4 x 4 texels with their views.
     pub(crate) fn textures(&mut self, count: u32, memory: Memory) -> Result<f64, BenchError> {
         self.create_and_destroy(count, |objects| objects.texture(memory))
+    }
+
+    /// As [`textures`](Self::textures), each with a descriptor.
+    pub(crate) fn written_textures(&mut self, count: u32, memory: Memory) -> Result<f64, BenchError> {
+        self.create_and_destroy(count, |objects| {
+            let made = objects.texture(memory)?;
+            if let RawObject::TracedImage(_, view) = made.0 {
+                objects.descriptors.write(view);
+            }
+            Ok(made)
+        })
     }
 
     fn create_and_destroy(
@@ -174,6 +189,80 @@ impl RawObjects {
             }
         }
         Ok(())
+    }
+}
+
+/// A set with descriptors of sampled images, which may change at any time.
+struct Descriptors {
+    layout: vk::DescriptorSetLayout,
+    pool: vk::DescriptorPool,
+    set: vk::DescriptorSet,
+    /// The descriptor to write next.
+    next: Cell<u32>,
+    device: ash::Device,
+}
+
+impl Descriptors {
+    const COUNT: u32 = 1024;
+
+    fn new(device: &ash::Device) -> Result<Self, BenchError> {
+        let null = (vk::DescriptorSetLayout::null(), vk::DescriptorPool::null(), vk::DescriptorSet::null());
+        let (layout, pool, set) = null;
+        let mut made = Self { layout, pool, set, next: Cell::new(0), device: device.clone() };
+        made.create()?;
+        Ok(made)
+    }
+
+    fn create(&mut self) -> Result<(), BenchError> {
+        let kind = vk::DescriptorType::SAMPLED_IMAGE;
+        let binding = vk::DescriptorSetLayoutBinding::default().descriptor_type(kind);
+        let binding = [binding.descriptor_count(Self::COUNT).stage_flags(vk::ShaderStageFlags::ALL)];
+        let flags =
+            [vk::DescriptorBindingFlags::UPDATE_AFTER_BIND | vk::DescriptorBindingFlags::PARTIALLY_BOUND];
+        let mut flags = vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
+        let layout = vk::DescriptorSetLayoutCreateInfo::default()
+            .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
+            .bindings(&binding)
+            .push_next(&mut flags);
+        let sizes = [vk::DescriptorPoolSize { ty: kind, descriptor_count: Self::COUNT }];
+        let pool = vk::DescriptorPoolCreateInfo::default()
+            .flags(vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND)
+            .max_sets(1)
+            .pool_sizes(&sizes);
+        // SAFETY: the descriptions are valid, and the library turns on the features that they need.
+        unsafe {
+            let made = self.device.create_descriptor_set_layout(&layout, None);
+            self.layout = made.map_err(BenchError::hand_written("vkCreateDescriptorSetLayout"))?;
+            let made = self.device.create_descriptor_pool(&pool, None);
+            self.pool = made.map_err(BenchError::hand_written("vkCreateDescriptorPool"))?;
+            let layouts = [self.layout];
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool);
+            let made = self.device.allocate_descriptor_sets(&info.set_layouts(&layouts));
+            self.set = made.map_err(BenchError::hand_written("vkAllocateDescriptorSets"))?[0];
+        }
+        Ok(())
+    }
+
+    /// Writes one descriptor after the other, and begins anew behind the last.
+    fn write(&self, view: vk::ImageView) {
+        let number = self.next.get();
+        self.next.set((number + 1) % Self::COUNT);
+        let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+        let image = [vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)];
+        let write = vk::WriteDescriptorSet::default().dst_set(self.set).dst_array_element(number);
+        let writes = [write.descriptor_type(vk::DescriptorType::SAMPLED_IMAGE).image_info(&image)];
+        // SAFETY: the set and the view are alive, and no command uses the set.
+        unsafe { self.device.update_descriptor_sets(&writes, &[]) };
+    }
+}
+
+impl Drop for Descriptors {
+    fn drop(&mut self) {
+        // SAFETY: no command ever used the set; objects that were never created are null, which is allowed.
+        unsafe {
+            self.device.destroy_descriptor_pool(self.pool, None);
+            self.device.destroy_descriptor_set_layout(self.layout, None);
+        }
     }
 }
 

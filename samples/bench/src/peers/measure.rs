@@ -102,6 +102,7 @@ fn measure(
     let device = probe.device.name.clone();
     let mut report = Report::new(entries, &device, rounds, options.quick || options.validate);
     drop(probe);
+    report.add_note(format!("frames of rays and of textures: the mean of {} in a row", work.frames));
     let timer = timer_layer().map_err(|error| report.add_note(format!("no time of the GPU: {error}"))).ok();
     let run = Rounds { entries, args, launch, device: &device, class, rounds };
     let [opened, memory] = run.opened();

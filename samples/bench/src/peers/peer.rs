@@ -1,5 +1,6 @@
 //! The interface of a measured library.
 
+use std::ops::Add;
 use std::time::Instant;
 
 use super::program::Program;
@@ -62,12 +63,20 @@ pub trait RowRun {
 }
 
 /// Times of one sample, in milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sample {
     /// Time of the thread until all work was submitted.
     pub cpu: f64,
     /// Time until the GPU was done.
     pub done: f64,
+}
+
+impl Add for Sample {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { cpu: self.cpu + other.cpu, done: self.done + other.done }
+    }
 }
 
 impl Sample {

@@ -94,6 +94,15 @@ impl Row {
         match self {
             Self::EmptySubmit => work.submits,
             Self::Buffers | Self::Textures => work.objects,
+            _ => self.frames(work),
+        }
+    }
+
+    /// Returns the number of times that a sample does the work, one after the other: a frame of a loop finds what the frame before it has left in
+    /// caches, and a single one behind a pause does not.
+    pub(super) const fn frames(self, work: &Workload) -> u32 {
+        match self {
+            Self::RayQueryFrame | Self::RayPipelineFrame | Self::TexturedFrame => work.frames,
             _ => 1,
         }
     }
@@ -121,6 +130,7 @@ mod tests {
         let work = Workload::QUICK;
         assert_eq!(Row::Buffers.items(&work), work.objects);
         assert_eq!(Row::Draws.items(&work), 1);
+        assert_eq!(Row::TexturedFrame.items(&work), work.frames);
         assert!(Row::TlasBuild.title(&work).contains(&work.instances.to_string()));
     }
 }

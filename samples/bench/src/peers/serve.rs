@@ -8,7 +8,7 @@ use lvk_dev_driver::{DriverRequest, prepare};
 
 use super::answer::Answer;
 use super::gpu_timer::take_busy_time;
-use super::peer::{Failure, PeerEntry, RowRun};
+use super::peer::{Failure, PeerEntry, RowRun, Sample};
 use super::row::Row;
 use super::workload::Workload;
 use crate::cpu_overhead::resident_mb;
@@ -32,7 +32,7 @@ pub(super) fn serve(entry: &PeerEntry, row: Row, workload: &Workload) -> Result<
     answer(&Answer::Ready)?;
     for line in stdin().lock().lines() {
         let found = match line?.trim() {
-            SAMPLE => run.sample().map(Answer::Times),
+            SAMPLE => sample(&mut *run, row.frames(workload)).map(Answer::Times),
             RESULT => run.result().map(Answer::Result),
             MEMORY => Ok(Answer::Memory(resident_mb())),
             GPU_TIME => take_busy_time().map(Answer::GpuTime),
@@ -41,6 +41,11 @@ pub(super) fn serve(entry: &PeerEntry, row: Row, workload: &Workload) -> Result<
         answer(&found.unwrap_or_else(|reason| Answer::Cannot(reason.to_string())))?;
     }
     std::process::exit(0);
+}
+
+/// Does the work `frames` times. Returns the sum of the times.
+fn sample(run: &mut dyn RowRun, frames: u32) -> Result<Sample, Failure> {
+    (0..frames).try_fold(Sample::default(), |sum, _| Ok(sum + run.sample()?))
 }
 
 fn open(entry: &PeerEntry, row: Row, workload: &Workload) -> Result<Box<dyn RowRun>, Failure> {

@@ -24,6 +24,8 @@ pub struct Workload {
     pub mesh_triangles: u32,
     /// Instances of the TLAS.
     pub instances: u32,
+    /// Frames in a row in a sample of a row of frames.
+    pub frames: u32,
     /// Textures that a frame reads.
     pub textures: u32,
     /// Triangles of the traced scene without a file.
@@ -45,6 +47,7 @@ impl Workload {
         meshes: 1_000,
         mesh_triangles: 1_000,
         instances: 100_000,
+        frames: 16,
         textures: 1_000,
         scene_triangles: 1_000_000,
         image: [1280, 720],
@@ -65,6 +68,7 @@ impl Workload {
         meshes: 3,
         mesh_triangles: 20,
         instances: 10,
+        frames: 2,
         textures: 12,
         scene_triangles: 600,
         image: [32, 18],
