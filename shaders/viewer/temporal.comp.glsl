@@ -2,9 +2,10 @@
 // Variance-Guided Filtering", 2017).
 #include "viewer/plane.glsl"
 
-// Frames in the mean while the camera moves: of matte layers, and of mirrors, whose picture moves otherwise than their surface.
+// Frames in the mean of matte layers while the camera moves.
 const float kMostFrames = 48.0;
-const float kMostMirrorFrames = 4.0;
+// Of other layers, whose picture moves otherwise than their surface: until a highlight has moved by its width, but these at least.
+const float kLeastMirrorFrames = 2.0;
 // While something else moves, whose light and shadow move with it.
 const float kMostMovingFrames = 16.0;
 // While it stands.
@@ -76,6 +77,12 @@ vec4 extended(vec4 mean, vec3 next, float most) {
     return vec4(mix(mean.rgb, next, 1.0 / count), count);
 }
 
+// Frames in which the eye goes around a surface by the width of a highlight.
+float framesOfHighlight(Seen seen, vec3 point, vec3 pointBefore) {
+    vec3 turned = normalize(point - frame.camera.eye) - normalize(pointBefore - frame.seenBefore.eye);
+    return seen.roughness * seen.roughness / max(length(turned), 1e-6);
+}
+
 void temporalPixel(uvec2 at) {
     ivec2 pixel = ivec2(at);
     uint place = pixelPlace(pixel);
@@ -83,14 +90,15 @@ void temporalPixel(uvec2 at) {
     vec3 matte = frame.planes.at[planePlace(kPlaneMatte, place)].rgb;
     vec3 mirrored = frame.planes.at[planePlace(kPlaneMirrored, place)].rgb;
     History history = kNoHistory;
+    vec3 point = seenPoint(frame.camera, pixel, seen.distance);
+    vec3 before = frame.planes.at[planePlace(kPlaneBefore, place)].xyz;
     if (frame.frameNumber > 0u && !isSky(seen)) {
-        vec3 before = frame.planes.at[planePlace(kPlaneBefore, place)].xyz;
-        vec2 moved = motionOf(seenPoint(frame.camera, pixel, seen.distance), before);
+        vec2 moved = motionOf(point, before);
         history = historyAt(vec2(pixel) + 0.5 - moved, seen, before);
     }
     bool isStill = frame.stillCount > 0u;
     float matteFrames = frame.sceneMoves != 0u ? kMostMovingFrames : kMostFrames;
-    float mirrorFrames = mix(kMostMirrorFrames, matteFrames, clamp(2.0 * seen.roughness, 0.0, 1.0));
+    float mirrorFrames = clamp(framesOfHighlight(seen, point, before), kLeastMirrorFrames, matteFrames);
     history.matte = extended(history.matte, matte, isStill ? kMostStillFrames : matteFrames);
     history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillFrames : mirrorFrames);
     vec2 bright = vec2(brightness(matte), brightness(mirrored));

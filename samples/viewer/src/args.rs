@@ -49,6 +49,11 @@ pub struct ViewerArgs {
     #[arg(value_parser = whole(1..=ViewerConfig::MAX_SAMPLES))]
     pub samples: u32,
 
+    /// Frames go on from those before, a sample each, as a window shows them: with a range of --frames, pictures of a camera or an animation in
+    /// motion. --samples does not count
+    #[arg(long, conflicts_with = "resume")]
+    pub real_time: bool,
+
     /// Surfaces that a path meets at most, 1 to 256
     #[arg(long, value_name = "N", default_value_t = ViewerConfig::DEFAULT_BOUNCES, value_parser = whole(1..=256))]
     pub bounces: u32,

@@ -120,7 +120,7 @@ pub struct ViewerConfig {
     pub cache_entries: u32,
     /// Culling of instances that are rasterised.
     pub culling: CullingMode,
-    /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
+    /// True if each frame goes on from those before with one sample, as in a window; else each frame has all its samples.
     pub is_progressive: bool,
 }
 

@@ -130,6 +130,7 @@ mod tests {
         assert_eq!(parsed("--indirect cache").unwrap().indirect, IndirectLight::Cache);
         assert_eq!(parsed("--primary raster").unwrap().primary, PrimaryVisibility::Raster);
         assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
+        assert!(!args.real_time && parsed("--real-time --frames 0..9").unwrap().real_time);
     }
 
     #[test]
@@ -161,6 +162,7 @@ mod tests {
             "--primary guess",
             "--indirect guess",
             "--cache-entries 0",
+            "--real-time --frames 0..9 --resume",
             "a.glb b.glb",
         ] {
             assert_eq!(parsed(line), None, "{line}");

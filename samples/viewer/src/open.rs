@@ -72,12 +72,15 @@ impl Request {
         }
         let (triangles, instances) = viewer.counts();
         let PreparationTimes { scene, pipelines } = viewer.preparation();
+        let samples = match config.is_progressive {
+            true => "a sample a frame".to_owned(),
+            false => format!("{} samples a pixel", config.samples),
+        };
         let [read, built, made] = [time, scene, pipelines].map(|time| time.as_secs_f64());
         let text = format!(
             "{}: {triangles} triangles, {instances} instances, read in {read:.2} s, uploaded and built in {built:.2} s, \
-             pipelines made in {made:.2} s; {} samples a pixel, paths of {} surfaces at most",
+             pipelines made in {made:.2} s; {samples}, paths of {} surfaces at most",
             viewer.name(),
-            config.samples,
             config.bounces
         );
         progress.pause();
@@ -100,7 +103,7 @@ impl Request {
             indirect: args.indirect,
             cache_entries: args.cache_entries,
             culling: args.culling,
-            is_progressive: self.is_for_window,
+            is_progressive: self.is_for_window || args.real_time,
             ..ViewerConfig::new(path, width, height)
         })
     }

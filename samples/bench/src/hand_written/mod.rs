@@ -16,4 +16,4 @@ pub(super) use commands::RawCommands;
 pub(super) use device::RawDevice;
 pub(super) use objects::{Memory, RawObjects};
 pub(super) use recorder::RawRecorder;
-pub(super) use rt_pipeline::RawTracing;
+pub(super) use rt_pipeline::{RawTracing, StackSize};

@@ -37,7 +37,19 @@ pub(crate) struct RawTracing {
     /// The first ray generation shader, the miss shaders, the hit group, no callable shader.
     regions: [vk::StridedDeviceAddressRegionKHR; 4],
     sbt: Option<RawBuffer>,
+    stack: StackSize,
+    /// What each trace sets, in bytes.
+    stack_bytes: u32,
     device: Rc<RawDevice>,
+}
+
+/// How the pipeline gets its stack.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StackSize {
+    /// The driver computes the size.
+    Default,
+    /// Each trace sets the size, as the library does.
+    Set,
 }
 
 impl RawTracing {
@@ -48,6 +60,7 @@ impl RawTracing {
         words: &[Vec<u32>],
         tlas: vk::AccelerationStructureKHR,
         element: u32,
+        stack: StackSize,
     ) -> Result<Self, BenchError> {
         let mut made = Self {
             set_layout: vk::DescriptorSetLayout::null(),
@@ -57,6 +70,8 @@ impl RawTracing {
             set: vk::DescriptorSet::null(),
             regions: [vk::StridedDeviceAddressRegionKHR::default(); 4],
             sbt: None,
+            stack,
+            stack_bytes: 0,
             device: Rc::clone(device),
         };
         made.create_layouts(element + 1)?;
@@ -64,6 +79,7 @@ impl RawTracing {
         made.write_set(tlas, element);
         made.create_pipeline(words)?;
         made.create_sbt()?;
+        made.stack_bytes = made.bytes_of_stack();
         Ok(made)
     }
 
@@ -77,6 +93,9 @@ impl RawTracing {
             device.cmd_bind_pipeline(commands, point, self.pipeline);
             device.cmd_bind_descriptor_sets(commands, point, self.layout, 0, &[self.set], &[]);
             device.cmd_push_constants(commands, self.layout, STAGES, 0, bytemuck::bytes_of(view));
+            if self.stack == StackSize::Set {
+                self.device.tracing.cmd_set_ray_tracing_pipeline_stack_size(commands, self.stack_bytes);
+            }
             self.device.tracing.cmd_trace_rays(commands, ray_gen, miss, hit, callable, width, height, 1);
         }
     }
@@ -160,7 +179,13 @@ impl RawTracing {
         };
         let stages: Vec<_> = modules.iter().zip(&KINDS).map(stage).collect();
         let groups: Vec<_> = (0..).zip(&KINDS).map(|(index, kind)| group(index, *kind)).collect();
+        let dynamic = match self.stack {
+            StackSize::Default => &[][..],
+            StackSize::Set => &[vk::DynamicState::RAY_TRACING_PIPELINE_STACK_SIZE_KHR],
+        };
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(dynamic);
         let info = vk::RayTracingPipelineCreateInfoKHR::default()
+            .dynamic_state(&dynamic)
             .stages(&stages)
             .groups(&groups)
             .max_pipeline_ray_recursion_depth(1)
@@ -170,6 +195,25 @@ impl RawTracing {
         let made = unsafe { self.device.tracing.create_ray_tracing_pipelines(none, cache, &[info], None) };
         made.map(|pipelines| pipelines[0])
             .map_err(|(_, result)| BenchError::hand_written("vkCreateRayTracingPipelinesKHR")(result))
+    }
+
+    /// Returns the bytes of a ray generation shader and of the largest shader that it calls.
+    fn bytes_of_stack(&self) -> u32 {
+        let of_kind = |hit: bool| {
+            let groups =
+                (0..).zip(&KINDS).filter(|(_, kind)| (**kind == vk::ShaderStageFlags::RAYGEN_KHR) != hit);
+            let bytes = groups.map(|(group, kind)| {
+                let shader = match *kind {
+                    vk::ShaderStageFlags::CLOSEST_HIT_KHR => vk::ShaderGroupShaderKHR::CLOSEST_HIT,
+                    _ => vk::ShaderGroupShaderKHR::GENERAL,
+                };
+                let tracing = &self.device.tracing;
+                // SAFETY: the pipeline has the group, and the group the shader.
+                unsafe { tracing.get_ray_tracing_shader_group_stack_size(self.pipeline, group, shader) }
+            });
+            bytes.max().unwrap_or(0)
+        };
+        (of_kind(false) + of_kind(true)) as u32
     }
 
     /// Creates the SBT: handles of the first ray generation shader, both miss shaders and the hit group, each at the base alignment.
