@@ -9,14 +9,16 @@ use super::{diagnostics, sanitize};
 /// reads `log` as the compiler's log.
 ///
 /// Directives count wherever they stand, also in comments and in branches that the preprocessor leaves out. Texts of the
-/// library have guards against repetition, so their own directives are left out.
-pub fn read_glsl(text: &str, listed: &[(&str, &str)], log: &str) {
+/// library have guards against repetition, so their own directives are left out. True if the text gets to the compiler.
+pub fn read_glsl(text: &str, listed: &[(&str, &str)], log: &str) -> bool {
     let mut includes = Includes::new(listed, &[], None);
-    if let Ok(text) = sanitize::to_ascii(text).and_then(|text| sanitize::without_version(&text)) {
-        request_includes(&mut includes, &text, 1);
+    let prepared = sanitize::to_ascii(text).and_then(|text| sanitize::without_version(&text));
+    if let Ok(text) = &prepared {
+        request_includes(&mut includes, text, 1);
     }
     drop(diagnostics::warnings(log));
     drop(diagnostics::errors(log, includes.into_failures()));
+    prepared.is_ok()
 }
 
 /// Requests the includes of a text at this depth, and theirs. A directive with quotes that fails is requested again with

@@ -1,13 +1,14 @@
 //! Entry points of fuzz targets: the code that reads bytes from outside, without a device.
 //!
 //! Checksums keep random bytes out of the code behind them. Each entry therefore takes bytes as they are, or seals them with
-//! the checksum that a file of these contents has.
+//! the checksum that a file of these contents has. Each reader returns true for bytes that are accepted.
 
 use std::collections::HashMap;
 
 use crate::accel::blas_file;
 use crate::bindless::index_checks::{CheckPlan, WordRange};
 use crate::context::serialize::{driver_structure_bytes, part_plans_from_file};
+use crate::error::Result;
 use crate::gpu::caps::features::Features;
 use crate::pipeline::cache_file::{self, CacheOwner};
 use crate::pipeline::stage_interface_check::interface_difference;
@@ -26,7 +27,7 @@ use crate::shader::{
 
 /// Reads words as the creation of a shader module and its pipelines does, and runs each pass that rewrites modules.
 /// `choice` chooses the stage.
-pub fn read_spirv(choice: u8, words: &[u32]) {
+pub fn read_spirv(choice: u8, words: &[u32]) -> bool {
     let stage = ShaderStage::ALL[usize::from(choice) % ShaderStage::ALL.len()];
     run_passes(words);
     lower_alone(stage, words);
@@ -38,10 +39,11 @@ pub fn read_spirv(choice: u8, words: &[u32]) {
     };
     let module = compile(&desc, &CompileOptions::default(), CompileFiles::default())
         .and_then(|words| reflect(desc.debug_name, stage, &words));
-    match module {
-        Ok(module) => use_reflection(stage, &module),
+    match &module {
+        Ok(module) => use_reflection(stage, module),
         Err(error) => drop(error.to_string()),
     }
+    module.is_ok()
 }
 
 /// Lowers a ray tracing pipeline whose only shader are these words, in every role.
@@ -112,8 +114,11 @@ fn use_reflection(stage: ShaderStage, module: &Reflection) {
 }
 
 /// Returns the words of a shader of each kind that the SPIR-V passes rewrite, with the choice of its stage.
+///
+/// # Errors
+/// A shader does not compile.
 #[cfg(feature = "glsl")]
-pub fn example_spirv() -> Vec<(u8, Vec<u32>)> {
+pub fn example_spirv() -> Result<Vec<(u8, Vec<u32>)>> {
     const TEXTS: [(ShaderStage, &str); 4] = [
         (
             ShaderStage::Compute,
@@ -146,43 +151,59 @@ pub fn example_spirv() -> Vec<(u8, Vec<u32>)> {
     let compiled = |(stage, text): (ShaderStage, &str)| {
         let source = ShaderSource::Glsl(text);
         let desc = ShaderModuleDesc { stage, source, ..ShaderModuleDesc::default() };
-        let words = compile(&desc, &CompileOptions::default(), CompileFiles::default()).ok()?;
-        let choice = ShaderStage::ALL.iter().position(|known| *known == stage)?;
-        Some((choice as u8, words))
+        let words = compile(&desc, &CompileOptions::default(), CompileFiles::default())?;
+        let choice = ShaderStage::ALL.iter().take_while(|known| **known != stage).count();
+        Ok((choice as u8, words))
     };
-    TEXTS.into_iter().filter_map(compiled).collect()
+    TEXTS.into_iter().map(compiled).collect()
 }
 
 /// Reads a pipeline cache file up to the data that the driver gets: the whole file, or the file around such data.
-pub fn read_pipeline_cache(is_sealed: bool, bytes: &[u8]) {
+pub fn read_pipeline_cache(is_sealed: bool, bytes: &[u8]) -> bool {
     // The owner is that of the data, else its checks would end there.
     let word =
         |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map_or(0, u32::from_le_bytes);
     let uuid = bytes.get(16..32).and_then(|uuid| uuid.try_into().ok()).unwrap_or_default();
     let owner = CacheOwner { vendor: word(8), device: word(12), cache_uuid: uuid, ..CacheOwner::default() };
-    for owner in [owner, CacheOwner::default()] {
+    let is_accepted = [owner, CacheOwner::default()].map(|owner| {
         let file = if is_sealed { cache_file::encode_file(&owner, bytes) } else { bytes.to_vec() };
-        drop(cache_file::decode_file(&owner, &file).map_err(|error| error.to_string()));
-    }
+        cache_file::decode_file(&owner, &file).map_err(|error| error.to_string()).is_ok()
+    });
+    is_accepted.contains(&true)
+}
+
+/// Returns the whole file of a pipeline cache of no device, with these data of the driver.
+pub fn whole_pipeline_file(data: &[u8]) -> Vec<u8> {
+    cache_file::encode_file(&CacheOwner::default(), data)
 }
 
 /// Reads a file of the shader cache: the whole file, or the file with this body. Words that it contains are reflected, as
 /// those of every module are.
-pub fn read_shader_cache(is_sealed: bool, bytes: &[u8]) {
+pub fn read_shader_cache(is_sealed: bool, bytes: &[u8]) -> bool {
     let key = disk_file::Fingerprint::from_bytes(b"key");
-    let file = if is_sealed { disk_file::sealed(key, bytes) } else { bytes.to_vec() };
-    if let Ok(module) = disk_file::decode_file(key, &file) {
+    let file = if is_sealed { whole_shader_file(bytes) } else { bytes.to_vec() };
+    let module = disk_file::decode_file(key, &file);
+    if let Ok(module) = &module {
         drop(reflect("outside", ShaderStage::Compute, &module.words));
     }
+    module.is_ok()
+}
+
+/// Returns the whole file of the shader cache with this body.
+pub fn whole_shader_file(body: &[u8]) -> Vec<u8> {
+    disk_file::sealed(disk_file::Fingerprint::from_bytes(b"key"), body)
 }
 
 /// Reads a serialised BLAS up to what only its driver can read: the whole file, or the file with this body. The mesh is the
 /// one that the file states. A BLAS of software traversal is read whole.
-pub fn read_blas(is_sealed: bool, bytes: &[u8]) {
-    let file = if is_sealed { blas_file::sealed(bytes) } else { bytes.to_vec() };
+pub fn read_blas(is_sealed: bool, bytes: &[u8]) -> bool {
+    let file = if is_sealed { whole_blas_file(bytes) } else { bytes.to_vec() };
     let blob = match blas_file::decode_blas_file(&file) {
         Ok(blob) => blob,
-        Err(error) => return drop(error.to_string()),
+        Err(error) => {
+            drop(error.to_string());
+            return false;
+        }
     };
     let counts: Vec<u32> = blob.geometries.iter().map(|geometry| geometry.primitive_count).collect();
     drop(part_plans_from_file(&blob, &counts));
@@ -190,11 +211,18 @@ pub fn read_blas(is_sealed: bool, bytes: &[u8]) {
         _ = (part.version_data(), driver_structure_bytes(part));
     }
     #[cfg(feature = "software-ray-query")]
-    software::read_blob(&blob, counts);
+    return software::read_blob(&blob, counts);
+    #[cfg(not(feature = "software-ray-query"))]
+    true
+}
+
+/// Returns the whole file of a serialised BLAS with this body.
+pub fn whole_blas_file(body: &[u8]) -> Vec<u8> {
+    blas_file::sealed(body)
 }
 
 #[cfg(feature = "software-ray-query")]
-pub use software::{example_blas, example_trees, read_tree};
+pub use software::{example_blas, example_trees, read_tree, whole_tree_file};
 
 #[cfg(feature = "software-ray-query")]
 mod software {
@@ -212,28 +240,37 @@ mod software {
     use crate::software_ray_query::layout::{LeafBox, LeafTriangle};
     use crate::software_ray_query::validate_blob::validate_blob;
 
-    /// Reads the BVH in a serialised BLAS, and splits it as TLAS do.
-    pub(super) fn read_blob(file: &BlasFile, counts: Vec<u32>) {
+    /// Reads the BVH in a serialised BLAS, and splits it as TLAS do. False for a BVH that is refused.
+    pub(super) fn read_blob(file: &BlasFile, counts: Vec<u32>) -> bool {
         let is_aabbs = file.geometries.first().is_some_and(|first| first.kind == BlasFileGeometryKind::Boxes);
         let expected = ExpectedMesh { is_aabbs, counts };
         let bytes = file.parts.first().and_then(|part| part.driver.strip_prefix(&SOFTWARE_BLOB_UUID[..]));
-        let Some(bytes) = bytes else { return };
-        if let Ok(validated) = validate_blob(bytes, &expected) {
+        let Some(bytes) = bytes else { return true };
+        let validated = validate_blob(bytes, &expected);
+        if let Ok(validated) = &validated {
             drop(subtree_parts(&BlasBlob { bytes: bytes.to_vec(), bounds: validated.bounds }));
         }
+        validated.is_ok()
     }
 
     /// Reads a file of the tree cache, the whole file or the file around this BVH, for a mesh with these numbers of
     /// primitives, and splits the BVH as TLAS do.
-    pub fn read_tree(is_sealed: bool, is_aabbs: bool, counts: &[u32], bytes: &[u8]) {
+    pub fn read_tree(is_sealed: bool, is_aabbs: bool, counts: &[u32], bytes: &[u8]) -> bool {
         let expected = ExpectedMesh { is_aabbs, counts: counts.to_vec() };
         let file = match is_sealed {
-            true => encode_file(bytes),
+            true => whole_tree_file(bytes),
             false => bytes.to_vec(),
         };
-        if let Ok(blob) = decode_file(&file, &expected) {
-            drop(subtree_parts(&blob));
+        let blob = decode_file(&file, &expected);
+        if let Ok(blob) = &blob {
+            drop(subtree_parts(blob));
         }
+        blob.is_ok()
+    }
+
+    /// Returns the whole file of the tree cache with this BVH.
+    pub fn whole_tree_file(bytes: &[u8]) -> Vec<u8> {
+        encode_file(bytes)
     }
 
     /// Returns BVHs of each encoding, with `is_aabbs` and the counts of [`read_tree`].

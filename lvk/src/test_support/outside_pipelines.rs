@@ -106,22 +106,24 @@ pub(crate) fn lower_with(
 }
 
 /// Creates the shader of these words as the creation of shader modules does, and lowers the pipeline with it. `choice`
-/// chooses its place and the traversal.
+/// chooses its place and the traversal. True if the pipeline is lowered.
 ///
 /// # Panics
 /// If the lowered words are no module.
-pub fn read_ray_pipeline(choice: u8, outside: &[u32]) {
+pub fn read_ray_pipeline(choice: u8, outside: &[u32]) -> bool {
     let place = usize::from(choice) % SHADERS.len().max(1);
     let traversal = TRAVERSALS[usize::from(choice) / SHADERS.len().max(1) % TRAVERSALS.len()];
-    let Some((stage, _)) = SHADERS.get(place) else { return };
-    let Some(outside) = compiled(*stage, ShaderSource::Spirv(outside)) else { return };
+    let Some((stage, _)) = SHADERS.get(place) else { return false };
+    let Some(outside) = compiled(*stage, ShaderSource::Spirv(outside)) else { return false };
     if reflect(NAME, *stage, &outside).is_err() {
-        return;
+        return false;
     }
-    match lower_with(place, &outside, traversal) {
-        Ok(lowered) => assert!(words::validate(&lowered).is_ok(), "the lowered words are no module"),
+    let lowered = lower_with(place, &outside, traversal);
+    match &lowered {
+        Ok(lowered) => assert!(words::validate(lowered).is_ok(), "the lowered words are no module"),
         Err(error) => assert!(!error.message.is_empty()),
     }
+    lowered.is_ok()
 }
 
 /// Returns inputs of the fuzz target: each shader of the pipeline in its place, by each traversal.

@@ -1,11 +1,12 @@
 //! Processes that are killed (SIGKILL): what they leave is whole, and the next start works.
 
+use std::process::Command;
 use std::time::Instant;
 
 use rustix::process::Signal;
 
 use crate::kill_point::{KillPoint, kill_points, wait_for};
-use crate::program::{Desk, Task, has_device};
+use crate::program::{Desk, Ended, Task, has_device};
 
 /// Counts of kills.
 #[derive(Debug, Default)]
@@ -56,6 +57,16 @@ fn kill_many(task: Task, seed: u64, count: usize) -> usize {
     }
     eprintln!("{task:?}, seed {seed}: {tally:?} in {:.0} s", start.elapsed().as_secs_f32());
     tally.killed
+}
+
+#[test]
+fn only_a_process_that_the_signal_ended_counts_as_killed() {
+    let ends = |script: &str| {
+        let status = Command::new("sh").args(["-c", script]).status().unwrap();
+        Ended { status, err: String::new() }.is_by_signal(Signal::KILL.as_raw())
+    };
+    assert!(ends("kill -KILL $$"));
+    assert!(!ends("kill -SEGV $$") && !ends("exit 137") && !ends("true"));
 }
 
 #[test]

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-/// Writes files into a new folder in memory, where the system has one, and passes the folder to `read`.
+/// Writes files into a new folder in memory, where the system has one, and passes the folder to `read`. Returns its result.
 ///
 /// # Panics
 /// If a file cannot be written, as no input would be read.
 #[allow(clippy::panic, reason = "a target that reads nothing has failed")]
-pub(crate) fn with_files(files: &[(&str, &[u8])], read: impl FnOnce(&Path)) {
+pub(crate) fn with_files<T>(files: &[(&str, &[u8])], read: impl FnOnce(&Path) -> T) -> T {
     let memory = Path::new("/dev/shm");
     let parent = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
     let folder = tempfile::Builder::new().prefix("lvk-fuzz-").tempdir_in(&parent);
@@ -16,7 +16,7 @@ pub(crate) fn with_files(files: &[(&str, &[u8])], read: impl FnOnce(&Path)) {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     }
-    read(folder.path());
+    read(folder.path())
 }
 
 #[cfg(test)]

@@ -17,12 +17,12 @@ enum Place {
 /// A `.gltf` or `.glb` file. A first byte below 16 is a number of a model, whose JSON the rest edits: so inputs get behind the
 /// container and the parser. Bit 3 of that number, or else bit 2 of the input's length, tells whether the model is read in a file;
 /// the length of a `.glb` file is a multiple of 4.
-pub(crate) fn read_gltf(bytes: &[u8]) {
+pub(crate) fn read_gltf(bytes: &[u8]) -> bool {
     let place = |is_file: bool| if is_file { Place::File } else { Place::Memory };
     match edited_model(bytes) {
         Some(model) => loads(&model, place(bytes.first().is_some_and(|first| first & 8 != 0))),
         None => loads(bytes, place(bytes.len() & 4 != 0)),
-    };
+    }
 }
 
 /// Reads a file, and checks what programs rely on. True if it loads. Within the bound of the target lie that of the load, and the

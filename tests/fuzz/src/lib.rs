@@ -30,8 +30,8 @@ pub struct Target {
     pub memory: MemoryBound,
     /// Bytes that the reader may make of an input by the size that it states; 0 for readers of other inputs.
     pub decoded: fn(&[u8]) -> usize,
-    /// Reads an input.
-    pub read: fn(&[u8]),
+    /// Reads an input. True if it is accepted.
+    pub read: fn(&[u8]) -> bool,
 }
 
 /// The memory that an input took.
@@ -41,6 +41,8 @@ pub struct Cost {
     pub bytes: usize,
     /// The bound of the input.
     pub most: usize,
+    /// True if the input was accepted.
+    pub is_accepted: bool,
 }
 
 impl Target {
@@ -57,7 +59,9 @@ impl Target {
     pub fn run(&self, bytes: &[u8]) -> Cost {
         let cost = watched(self.name, bytes, || {
             let most = self.memory.bytes_for(bytes.len(), (self.decoded)(bytes));
-            Cost { bytes: memory::peak_of(most, || (self.read)(bytes)), most }
+            let mut is_accepted = false;
+            let bytes = memory::peak_of(most, || is_accepted = (self.read)(bytes));
+            Cost { bytes, most, is_accepted }
         });
         assert!(
             cost.bytes <= cost.most,
@@ -87,28 +91,32 @@ mod tests {
 
     const BOUND: MemoryBound = MemoryBound { fixed: 100, per_byte: 10, per_decoded: 3, most: 1_000 };
 
-    fn target(name: &'static str, decoded: fn(&[u8]) -> usize, read: fn(&[u8])) -> Target {
+    fn target(name: &'static str, decoded: fn(&[u8]) -> usize, read: fn(&[u8]) -> bool) -> Target {
         Target { name, memory: BOUND, decoded, read }
+    }
+
+    fn takes(bytes: usize) -> bool {
+        !vec![0_u8; bytes].is_empty()
     }
 
     #[test]
     fn a_reader_within_its_bound_passes() {
-        let cost = target("little", |_| 0, |bytes| drop(vec![0_u8; 10 * bytes.len()])).run(&[0; 50]);
-        assert_eq!((cost.bytes, cost.most), (500, 600));
-        let cost = target("stated", |_| 100, |_| drop(vec![0_u8; 800])).run(&[0; 50]);
+        let cost = target("little", |_| 0, |bytes| takes(10 * bytes.len())).run(&[0; 50]);
+        assert_eq!((cost.bytes, cost.most, cost.is_accepted), (500, 600, true));
+        let cost = target("stated", |_| 100, |_| takes(800)).run(&[0; 50]);
         assert_eq!((cost.bytes, cost.most), (800, 900));
     }
 
     #[test]
     #[should_panic(expected = "target 'much' took 2000 bytes for an input of 50, more than 600")]
     fn a_reader_beyond_its_bound_fails() {
-        _ = target("much", |_| 0, |bytes| drop(vec![0_u8; 40 * bytes.len()])).run(&[0; 50]);
+        _ = target("much", |_| 0, |bytes| takes(40 * bytes.len())).run(&[0; 50]);
     }
 
     #[test]
     #[should_panic(expected = "target 'long' took 2000 bytes for an input of 200, more than 1000")]
     fn a_reader_beyond_its_ceiling_fails() {
-        _ = target("long", |_| 0, |bytes| drop(vec![0_u8; 10 * bytes.len()])).run(&[0; 200]);
+        _ = target("long", |_| 0, |bytes| takes(10 * bytes.len())).run(&[0; 200]);
     }
 
     #[test]

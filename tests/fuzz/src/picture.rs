@@ -29,7 +29,7 @@ fn parts_of(bytes: &[u8]) -> (&'static str, Bounds, &[u8]) {
 }
 
 /// An image file. The first byte chooses its name and the bounds.
-pub(crate) fn read_image(bytes: &[u8]) {
+pub(crate) fn read_image(bytes: &[u8]) -> bool {
     let (name, bounds, file) = parts_of(bytes);
     with_files(&[(name, file)], |folder| match picture::read(&folder.join(name), &bounds) {
         Ok(picture) => {
@@ -37,9 +37,10 @@ pub(crate) fn read_image(bytes: &[u8]) {
             assert!(texels > 0 && picture.rgba.len() == 4 * texels);
             assert!(picture.width <= bounds.max_side && picture.height <= bounds.max_side);
             assert!(texels as u64 <= bounds.max_texels);
+            true
         }
-        Err(error) => drop(error.to_string()),
-    });
+        Err(error) => error.to_string().is_empty(),
+    })
 }
 
 /// Returns the bytes that may be made of an image: those of the decoder where it gives whole images, those of the picture, and

@@ -37,7 +37,19 @@ fn the_corpus_is_small_and_read_within_the_bounds() {
         assert!(!inputs.is_empty(), "no inputs of '{}'", target.name);
         let total: usize = inputs.iter().map(Vec::len).sum();
         assert!(total <= 128 << 10, "the corpus of '{}' has {total} bytes", target.name);
-        inputs.iter().for_each(|bytes| _ = run(target, bytes));
+        let accepted = inputs.iter().filter(|bytes| run(target, bytes).is_accepted).count();
+        println!("{}: {accepted} of {} inputs are accepted", target.name, inputs.len());
+        assert!(accepted > 0, "'{}' refuses every input, so mutations do not get far", target.name);
+    }
+}
+
+/// A header or a checksum that has changed would keep every mutation of such a file out.
+#[test]
+fn whole_files_are_accepted() {
+    for name in ["blas", "pipeline_cache", "shader_cache", "tree"] {
+        let target = Target::find(name).unwrap();
+        let bytes = std::fs::read(corpus_folder(target).join("whole-file")).unwrap();
+        assert!(run(target, &bytes).is_accepted, "{name}");
     }
 }
 

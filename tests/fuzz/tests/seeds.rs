@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::io::Cursor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ImageFormat, RgbaImage};
 use lvk::test_hooks::{outside_bytes, outside_pipelines};
@@ -14,8 +14,12 @@ const BMP: u8 = 2;
 const TGA: u8 = 3;
 const SMALL: u8 = 0x80;
 
+fn corpus_folder(target: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target)
+}
+
 fn write(target: &str, name: &str, parts: &[&[u8]]) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    let folder = corpus_folder(target);
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join(name), parts.concat()).unwrap();
 }
@@ -24,14 +28,24 @@ fn write(target: &str, name: &str, parts: &[&[u8]]) {
 #[ignore = "writes files"]
 fn write_seeds() {
     write_images();
-    write_modules("spirv", outside_bytes::example_spirv());
+    write_modules("spirv", outside_bytes::example_spirv().unwrap());
     write_modules("ray_pipeline", outside_pipelines::example_ray_pipeline());
     for (number, (is_aabbs, counts, tree)) in outside_bytes::example_trees().into_iter().enumerate() {
         let choice = 1 | u8::from(is_aabbs) << 1 | (counts.len() as u8) << 2;
         let counts: Vec<u8> = counts.iter().flat_map(|count| (*count as u16).to_le_bytes()).collect();
         write("tree", &format!("seed-{number}"), &[&[choice], &counts, &tree]);
+        if number == 0 {
+            write("tree", "whole-file", &[&[choice & !1], &counts, &outside_bytes::whole_tree_file(&tree)]);
+        }
     }
-    write("blas", "seed-0", &[&[1], &outside_bytes::example_blas()]);
+    let blas = outside_bytes::example_blas();
+    write("blas", "seed-0", &[&[1], &blas]);
+    write("blas", "whole-file", &[&[0], &outside_bytes::whole_blas_file(&blas)]);
+    // Vulkan's header, whose vendor, device and UUID are 0.
+    let data = [&[32, 0, 0, 0, 1, 0, 0, 0][..], &[0; 24], b"driver data"].concat();
+    write("pipeline_cache", "whole-file", &[&[0], &outside_bytes::whole_pipeline_file(&data)]);
+    let shader = std::fs::read(corpus_folder("shader_cache").join("seed-0")).unwrap();
+    write("shader_cache", "whole-file", &[&[0], &outside_bytes::whole_shader_file(&shader[1..])]);
 }
 
 fn write_modules(target: &str, modules: Vec<(u8, Vec<u32>)>) {

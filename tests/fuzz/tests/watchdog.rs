@@ -9,14 +9,14 @@ use lvk_fuzz::{MOST_SECONDS_VARIABLE, MemoryBound, Target};
 const ENDLESS_VARIABLE: &str = "LVK_FUZZ_ENDLESS";
 
 /// A reader that loops for ever.
-fn endless(_: &[u8]) {
+fn endless(_: &[u8]) -> bool {
     loop {
         std::hint::spin_loop();
     }
 }
 
 /// A reader that waits for ever.
-fn waiting(_: &[u8]) {
+fn waiting(_: &[u8]) -> bool {
     loop {
         std::thread::park();
     }

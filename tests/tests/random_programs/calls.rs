@@ -8,6 +8,7 @@ use lvk::{
 use super::cell::{Cell, compare, known, pattern};
 use super::image::{Image, Part, mip_extent, texel_bytes};
 use super::memory::{Blas, Effect, Tlas};
+use super::op::Kind;
 use super::plan::range;
 use super::plan_rays::{triangle_bytes, triangle_depth};
 use super::world::{BlasInfo, BufferInfo, Object, Pending, Problem, TextureInfo, TlasInfo, World, judge};
@@ -77,7 +78,8 @@ impl World<'_> {
         let bytes = pattern(n[3], size as usize);
         let written = self.ctx().upload_buffer(buffer.handle, offset, &bytes);
         if let (Some(()), Some(buffer)) = (judge(written, &problems)?, buffer.live) {
-            self.memory.apply(&Effect::Bytes { buffer, offset: offset as usize, bytes });
+            let effect = Effect::Bytes { buffer, offset: offset as usize, bytes };
+            self.memory.apply(&self.env.expected(Kind::UploadBuffer, effect));
         }
         Ok(true)
     }
@@ -236,7 +238,7 @@ impl World<'_> {
         let bytes = pattern(n[4], size);
         let written = self.ctx().upload_texture(texture.handle, &region, &bytes);
         if let (Some(()), Some(place)) = (judge(written, &problems)?, place) {
-            self.memory.apply(&Effect::Texels { place, bytes });
+            self.memory.apply(&self.env.expected(Kind::UploadTexture, Effect::Texels { place, bytes }));
         }
         Ok(true)
     }
@@ -301,7 +303,8 @@ impl World<'_> {
         let written = self.ctx().upload_buffer(mesh.handle, 36 * triangle as u64, &bytes);
         let problems: Vec<_> = mesh.problem.into_iter().collect();
         if let (Some(()), Some(mesh)) = (judge(written, &problems)?, mesh.live) {
-            self.memory.apply(&Effect::Move { mesh, triangle, depth });
+            let effect = Effect::Move { mesh, triangle, depth };
+            self.memory.apply(&self.env.expected(Kind::UploadMesh, effect));
         }
         Ok(true)
     }
@@ -331,7 +334,8 @@ impl World<'_> {
         let made = self.ctx().create_blas(&desc);
         if let (Some(holder), Some(mesh)) = (judge(made, &problems)?, mesh.live) {
             self.memory.blas.push(Blas { mesh, ..Default::default() });
-            self.memory.apply(&Effect::Build { blas: self.blas.len() });
+            let effect = Effect::Build { blas: self.blas.len() };
+            self.memory.apply(&self.env.expected(Kind::CreateBlas, effect));
             self.blas.push(Object::new(holder, BlasInfo { mesh, flags, was_compacted: false }));
         }
         Ok(true)
@@ -356,7 +360,8 @@ impl World<'_> {
         if let Some(holder) = judge(self.ctx().create_tlas(&desc), &problems)? {
             let tlas = self.memory.tlas.len();
             self.memory.tlas.push(Tlas::default());
-            self.memory.apply(&Effect::Place { tlas, instances: known });
+            let effect = Effect::Place { tlas, instances: known };
+            self.memory.apply(&self.env.expected(Kind::CreateTlas, effect));
             let count = raw.len() as u32;
             let info = TlasInfo { capacity: capacity.max(count), is_updatable, count };
             self.tlas.push(Object::new(holder, info));

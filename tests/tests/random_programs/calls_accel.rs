@@ -123,8 +123,10 @@ impl World<'_> {
         // SAFETY: the bytes come from `serialize_blas`; a flipped bit is damage that the checksum detects.
         let loaded = unsafe { self.ctx().load_blas(&desc, &bytes) };
         if let Some(holder) = judge(loaded, &problems)? {
-            let depths = self.memory.blas[number].depths.clone();
-            self.memory.blas.push(Blas { mesh: info.mesh, depths, version: 1 });
+            // The mesh holds what the BLAS was built of, as above.
+            self.memory.blas.push(Blas { mesh: info.mesh, ..Default::default() });
+            let effect = Effect::Build { blas: self.blas.len() };
+            self.memory.apply(&self.env.expected(Kind::ReloadBlas, effect));
             self.blas.push(Object::new(holder, info));
         }
         Ok(true)

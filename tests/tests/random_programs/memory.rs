@@ -120,6 +120,11 @@ impl Default for Shading {
     }
 }
 
+/// Lets a byte be another one.
+fn falsify_cell(cell: &mut Cell) {
+    *cell = Cell::known(if cell.is_known() { cell.low ^ 1 } else { 0 });
+}
+
 impl Memory {
     /// Applies the effect of a command.
     pub fn apply(&mut self, effect: &Effect) {
@@ -178,20 +183,27 @@ impl Memory {
 
     /// Changes something that an effect has changed.
     fn falsify(&mut self, effect: &Effect) {
-        let another = |cell: &mut Cell| *cell = Cell::known(if cell.is_known() { cell.low ^ 1 } else { 0 });
         match effect {
             Effect::Bytes { buffer, offset, bytes } if !bytes.is_empty() => {
-                another(&mut self.buffers[*buffer][*offset]);
+                falsify_cell(&mut self.buffers[*buffer][*offset]);
             }
             Effect::CopyBytes { to, .. }
             | Effect::ToBuffer { to, .. }
             | Effect::Gather { to, .. }
-            | Effect::Trace { to, .. } => self.buffers[to.0].get_mut(to.1).into_iter().for_each(another),
-            Effect::Fill { place, .. } | Effect::Texels { place, .. } => {
-                let mut cells = self.images[place.image].read(place);
-                cells.first_mut().into_iter().for_each(another);
-                self.images[place.image].write(place, &cells);
+            | Effect::Trace { to, .. } => {
+                self.buffers[to.0].get_mut(to.1).into_iter().for_each(falsify_cell);
             }
+            Effect::Fill { place, .. }
+            | Effect::Texels { place, .. }
+            | Effect::FromBuffer { place, .. }
+            | Effect::CopyTexels { to: place, .. }
+            | Effect::Scale { to: place, .. } => self.falsify_texel(place),
+            Effect::Mips { first, mips } if *mips > 1 => {
+                let mip = first.mip + 1;
+                let extent = mip_extent(self.images[first.image].extent, mip);
+                self.falsify_texel(&Place { mip, offset: [0, 0], extent, ..*first });
+            }
+            Effect::Move { mesh, triangle, .. } => self.meshes[*mesh][*triangle] += 1,
             Effect::Build { blas } => self.blas[*blas].depths[0] += 1,
             Effect::Place { tlas, .. } => {
                 self.tlas[*tlas].instances.iter_mut().for_each(|(instance, _)| instance.custom += 1);
@@ -199,6 +211,13 @@ impl Memory {
             Effect::Query { pool, query, .. } => self.queries.reset(*pool, *query),
             _ => {}
         }
+    }
+
+    /// Changes the first byte of a place.
+    fn falsify_texel(&mut self, place: &Place) {
+        let mut cells = self.images[place.image].read(place);
+        cells.first_mut().into_iter().for_each(falsify_cell);
+        self.images[place.image].write(place, &cells);
     }
 
     fn trace(&mut self, tlas: usize, (buffer, offset): (usize, usize), shading: Shading) {

@@ -264,6 +264,28 @@ pub fn parse_program(text: &str) -> Result<Vec<Op>, String> {
 }
 
 impl Kind {
+    /// Returns the kinds that change what the model knows of the contents of an object.
+    pub fn with_effect() -> Vec<Self> {
+        // Texts of labels, and a time that no query of the model has; a wrong structure is refused.
+        const NONE: [Kind; 3] = [Kind::Label, Kind::Timestamp, Kind::WrongStructure];
+        let mut kinds = vec![
+            Self::MapBuffer,
+            Self::UploadBuffer,
+            Self::UploadTexture,
+            Self::UploadMesh,
+            Self::CreateBlas,
+            Self::CreateBlasBatch,
+            Self::ReloadBlas,
+            Self::CreateTlas,
+        ];
+        for (kind, _) in RECORDED.iter().chain(&RECORDED_LATER) {
+            if !NONE.contains(kind) && !kinds.contains(kind) {
+                kinds.push(*kind);
+            }
+        }
+        kinds
+    }
+
     /// Returns every kind.
     pub fn all() -> impl Iterator<Item = Self> {
         CALLED.iter().chain(&RECORDED).chain(&RECORDED_LATER).map(|(kind, _)| *kind)

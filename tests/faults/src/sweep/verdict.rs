@@ -223,14 +223,15 @@ fn judge_next(next: &NextStart, clean: &RunOutcome) -> Option<Flaw> {
 
 /// True if the library says that it leaks a context whose work cannot be waited for: every wait and every question about its
 /// progress fails for want of memory, so that the device may still use the objects. Each such context accounts for one device that is alive, or that an
-/// engine has destroyed before the objects of its guest: what others leak is a flaw.
+/// engine has destroyed before the objects of its guest, and for one instance at most: what others leak is a flaw.
 #[must_use]
 pub fn leaks_on_purpose(fault: Option<&Fault>, found: &RunOutcome) -> bool {
     let is_unanswered =
         fault.is_some_and(|fault| fault.span == Span::Unanswered && fault.error.is_want_of_memory());
-    let devices = found.live.get("VkDevice").copied().unwrap_or_default() + found.orphaning;
+    let live = |kind: &str| found.live.get(kind).copied().unwrap_or_default();
     let contexts = found.stderr.matches(LEAKED).count();
-    is_unanswered && contexts > 0 && devices <= contexts
+    let accounts = live("VkDevice") + found.orphaning == contexts && live("VkInstance") <= contexts;
+    is_unanswered && contexts > 0 && accounts
 }
 
 /// The end of the warning about a context that is leaked.
@@ -463,6 +464,14 @@ pub(super) mod tests {
             judged(FaultError::HostMemory, Span::Unanswered, &other_context),
             [Flaw::Leak("1 VkBuffer, 1 VkDevice".into())],
             "one context is leaked on purpose, and another leaks a buffer"
+        );
+        let two = BTreeMap::from([("VkDevice".to_owned(), 1), ("VkInstance".to_owned(), 2)]);
+        let other_instance = RunOutcome { live: two, ..leaked.clone() };
+        let flaw = [Flaw::Leak("1 VkDevice, 2 VkInstance".into())];
+        assert_eq!(
+            judged(FaultError::HostMemory, Span::Unanswered, &other_instance),
+            flaw,
+            "an instance of another"
         );
         let silent = RunOutcome { stderr: refused().stderr, ..leaked.clone() };
         assert_eq!(judged(FaultError::HostMemory, Span::Unanswered, &silent), [leak]);
