@@ -73,9 +73,10 @@ fn processes_at_once_share_cold_caches() {
     }
     start_at_once(Task::Small, 2, false, None);
     start_at_once(Task::Sequence, 4, true, None);
-    let killed =
-        (1..=3).filter(|file| start_at_once(Task::Small, 2, true, Some(KillPoint::Temporary(*file)))).count();
-    assert!(killed > 0, "none of 3 processes was killed");
+    // A process may end before its moment is seen.
+    let is_killed =
+        |attempt: usize| start_at_once(Task::Small, 2, true, Some(KillPoint::Temporary(attempt % 3 + 1)));
+    assert!((0..8).any(is_killed), "none of 8 processes was killed");
 }
 
 /// `LVK_KILLS=N` makes N / 30 rounds of 16 sets of processes.
