@@ -209,13 +209,27 @@ fn whole_window() {
     whole_of("whole_window", "window", &program, &SweepPlan { stays_out_of_date: true, ..whole_plan() });
 }
 
-/// The samples in a window: three frames of each. A process has one event loop, so there is no second try.
+/// Sweeps a sample in a window: three frames. A process has one event loop, so there is no second try.
+fn whole_of_window(name: &str, line: &str) {
+    let Some((_connection, _display, window)) = in_window() else { return };
+    let program = Program { variables: window.variables, tries_again: false, ..program(line) };
+    whole(name, line, &program);
+}
+
 #[test]
 #[ignore = "minutes: .ci/slow faults"]
-fn whole_windows_of_samples() {
-    let Some((_connection, _display, window)) = in_window() else { return };
-    for line in WINDOWED {
-        let program = Program { variables: window.variables.clone(), tries_again: false, ..program(line) };
-        whole(&format!("window of {line}"), line, &program);
-    }
+fn whole_window_of_hybrid() {
+    whole_of_window("whole_window_of_hybrid", WINDOWED[0]);
+}
+
+#[test]
+#[ignore = "minutes: .ci/slow faults"]
+fn whole_window_of_hello_triangle() {
+    whole_of_window("whole_window_of_hello_triangle", WINDOWED[1]);
+}
+
+#[test]
+#[ignore = "minutes: .ci/slow faults"]
+fn whole_window_of_viewer() {
+    whole_of_window("whole_window_of_viewer", WINDOWED[2]);
 }
