@@ -30,21 +30,19 @@ pub(crate) fn read_gltf(bytes: &[u8]) -> bool {
 fn loads(bytes: &[u8], place: Place) -> bool {
     let memory = MemoryLimit { fixed_bytes: 1 << 20, multiple: 32 };
     let options = LoadOptions { memory, most_threads: Some(1), ..LoadOptions::default() };
-    let mut is_loaded = false;
-    let mut check = |model: lvk_gltf::Result<Model>| {
-        is_loaded = model.is_ok();
-        match model {
-            Ok(model) => check_model(&model),
+    let check = |model: lvk_gltf::Result<Model>| {
+        match &model {
+            Ok(model) => check_model(model),
             Err(error) => drop(error.to_string()),
         }
+        model.is_ok()
     };
     match place {
         Place::Memory => check(Model::from_bytes(bytes, None, &options)),
         Place::File => with_files(&[("model", bytes), ("a.bin", bytes)], |folder| {
-            check(Model::load(&folder.join("model"), &options));
+            check(Model::load(&folder.join("model"), &options))
         }),
     }
-    is_loaded
 }
 
 fn check_model(model: &Model) {

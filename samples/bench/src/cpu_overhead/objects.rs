@@ -21,14 +21,16 @@ pub(super) fn measure(
     workload: Workload,
 ) -> Result<Vec<OverheadRow>, BenchError> {
     let mut raw = RawObjects::new(ctx)?;
-    let buffers = interleave(workload.runs, |which| match memory(which) {
-        None => create_and_destroy(ctx, || buffer(ctx).map(drop)),
-        Some(memory) => raw.buffers(AT_ONCE, BUFFER_BYTES, memory),
+    let buffers = interleave(workload.runs, |which| match which {
+        0 => create_and_destroy(ctx, || buffer(ctx).map(drop)),
+        1 => raw.buffers(AT_ONCE, BUFFER_BYTES, Memory::Allocated),
+        _ => raw.buffers(AT_ONCE, BUFFER_BYTES, Memory::Preallocated),
     })?;
-    let [ours, by_hand, driver, written] = interleave(workload.runs, |which| match memory(which) {
-        None if which == 0 => create_and_destroy(ctx, || texture(ctx).map(drop)),
-        None => raw.written_textures(AT_ONCE, Memory::Preallocated),
-        Some(memory) => raw.textures(AT_ONCE, memory),
+    let [ours, by_hand, driver, written] = interleave(workload.runs, |which| match which {
+        0 => create_and_destroy(ctx, || texture(ctx).map(drop)),
+        1 => raw.textures(AT_ONCE, Memory::Allocated),
+        2 => raw.textures(AT_ONCE, Memory::Preallocated),
+        _ => raw.written_textures(AT_ONCE, Memory::Preallocated),
     })?;
     let descriptor = each_us(&written) - each_us(&driver);
     let textures = [ours, by_hand, driver];
@@ -41,11 +43,6 @@ pub(super) fn measure(
     rows.push(OverheadRow::new(name, median_of(&thousand, |ms| *ms), "ms", Limit::None));
     rows.extend(crowded_rows(setup, workload)?);
     Ok(rows)
-}
-
-/// Returns the memory of the hand-written variant; `None` for the library's turn and those behind.
-fn memory(turn: usize) -> Option<Memory> {
-    [None, Some(Memory::Allocated), Some(Memory::Preallocated)].get(turn).copied().flatten()
 }
 
 /// Returns the rows of the library, compared with hand-written Vulkan. The third sample uses preallocated memory and so

@@ -38,7 +38,7 @@ pub(crate) struct RawTracing {
     regions: [vk::StridedDeviceAddressRegionKHR; 4],
     sbt: Option<RawBuffer>,
     stack: StackSize,
-    /// What each trace sets, in bytes.
+    /// Size of the stack that each trace sets, in bytes.
     stack_bytes: u32,
     device: Rc<RawDevice>,
 }
