@@ -65,11 +65,10 @@ vec2 motionAt(ivec2 pixel, Seen seen) {
     return motionOf(point, frame.planes.at[planePlace(kPlaneBefore, pixelPlace(pixel))].xyz);
 }
 
-// The motion of the nearest of the surfaces around a pixel: an edge moves with what is in front.
-vec2 motionAround(ivec2 pixel) {
+// The motion of the nearest of the surfaces around a pixel, which shows `found`: an edge moves with what is in front.
+vec2 motionAround(ivec2 pixel, Seen found) {
     ivec2 last = ivec2(frame.camera.width, frame.camera.height) - 1;
     ivec2 nearest = pixel;
-    Seen found = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, pixelPlace(pixel))]);
     for (int tap = 0; tap < 9; ++tap) {
         ivec2 at = clamp(pixel + ivec2(tap % 3, tap / 3) - 1, ivec2(0), last);
         Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, pixelPlace(at))]);
@@ -102,7 +101,7 @@ void antialiasPixel(uvec2 at) {
     if (isStill()) {
         mean = frame.planes.at[previousPlane(kPlaneColor, place)];
     } else if (frame.frameNumber > 0u) {
-        vec2 from = vec2(pixel) + 0.5 - motionAround(pixel);
+        vec2 from = vec2(pixel) + 0.5 - motionAround(pixel, seen);
         bool isInside = all(greaterThanEqual(from, vec2(0.0))) && all(lessThan(from, vec2(frame.camera.width, frame.camera.height)));
         if (isInside) {
             mean = before(from);
