@@ -388,6 +388,9 @@ impl Drop for SharedDeviceState {
             }
         }
         drop(self.submitter.drain());
+        if let Some(checks) = &self.bindless.checks {
+            checks.log_faults();
+        }
         self.0.free_leaked_objects();
         // SAFETY: the state is not used again.
         unsafe { ManuallyDrop::drop(&mut self.0) };

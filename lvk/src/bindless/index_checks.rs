@@ -13,6 +13,7 @@
 //! lacks a declaration, and so does a shader that writes one.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -68,6 +69,28 @@ pub struct IndexFault {
     pub shader: String,
     /// Number of accesses, counted by invocation. Helper invocations do not count.
     pub count: u32,
+}
+
+/// A line for a log: the shader, the index, the cause with the name of the object, and the remedy.
+impl fmt::Display for IndexFault {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { array, index, state, object, shader, count } = self;
+        let object = object.as_deref().unwrap_or_default();
+        write!(out, "shader '{shader}' used index {index} of {array:?} {count} times: ")?;
+        match state {
+            SlotState::NeverCreated => out.write_str("no object has had it; pass the index of a live object"),
+            SlotState::Freed => write!(
+                out,
+                "'{object}' was destroyed before the command buffer was begun; keep its Holder while shaders use the index"
+            ),
+            SlotState::OtherUsage => {
+                write!(out, "'{object}' lacks the usage of this array; create it with SAMPLED or STORAGE")
+            }
+            SlotState::Undeclared => {
+                write!(out, "'{object}' is missing in the Dependencies of the command; name it there")
+            }
+        }
+    }
 }
 
 impl BindlessArray {
@@ -135,6 +158,8 @@ pub(crate) struct IndexChecks {
     declarations: u32,
     /// Number of the last command.
     commands: AtomicU32,
+    /// Accesses of the faults that the application has asked for.
+    reported: AtomicU32,
     known: Mutex<SlotOwners>,
 }
 
@@ -164,7 +189,14 @@ impl IndexChecks {
         let buffer = Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?);
         buffer.fill_with(|bytes| bytes.fill(0));
         let known = Mutex::new(Rank::SlotOwners, SlotOwners::default());
-        let checks = Self { buffer, arrays, declarations, commands: AtomicU32::new(0), known };
+        let checks = Self {
+            buffer,
+            arrays,
+            declarations,
+            commands: AtomicU32::new(0),
+            reported: AtomicU32::new(0),
+            known,
+        };
         BindlessArray::ALL.into_iter().for_each(|array| checks.write(array, 0, ALIVE));
         Ok(checks)
     }
@@ -216,6 +248,11 @@ impl IndexChecks {
         barrier(gpu, commands, TRANSFER, ALL);
     }
 
+    /// Records that the host may read the faults of a command buffer at its end.
+    pub(crate) fn record_end(&self, gpu: &Gpu, commands: vk::CommandBuffer) {
+        barrier(gpu, commands, ALL, HOST);
+    }
+
     /// Records the accesses of the next command to textures, after all earlier commands.
     pub(crate) fn record_accesses(&self, gpu: &Gpu, commands: vk::CommandBuffer, accesses: &[SlotAccess]) {
         // The lowest bit of a declaration tells whether the texture is written.
@@ -242,6 +279,17 @@ impl IndexChecks {
         }
     }
 
+    /// Logs the faults at the end of a context, unless the application has asked for all of them. The device is idle.
+    pub(crate) fn log_faults(&self) {
+        let mut words = vec![0_u32; Self::fault_bytes() as usize / 4];
+        self.buffer.read(0, bytemuck::cast_slice_mut(&mut words));
+        let reported = self.reported.load(Ordering::Relaxed);
+        let faults = self.faults(&words);
+        if self.reported.load(Ordering::Relaxed) != reported {
+            faults.iter().for_each(|fault| log::error!("{fault}"));
+        }
+    }
+
     /// Returns the faults in a copy of the buffer's first [`fault_bytes`](Self::fault_bytes), sorted by array, index
     /// and shader.
     pub(crate) fn faults(&self, words: &[u32]) -> Vec<IndexFault> {
@@ -255,6 +303,8 @@ impl IndexChecks {
         }
         let mut faults: Vec<_> = entries.iter().filter_map(|entry| self.decode_fault(entry)).collect();
         faults.sort_by(|a, b| (a.array, a.index, &a.shader).cmp(&(b.array, b.index, &b.shader)));
+        let accesses = faults.iter().fold(0, |sum: u32, fault| sum.wrapping_add(fault.count));
+        self.reported.store(accesses, Ordering::Relaxed);
         faults
     }
 
@@ -315,6 +365,8 @@ const TRANSFER: SyncScope = (
         vk::AccessFlags2::TRANSFER_READ.as_raw() | vk::AccessFlags2::TRANSFER_WRITE.as_raw(),
     ),
 );
+
+const HOST: SyncScope = (vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
 
 /// Records a barrier for the buffer. The trackers do not know the buffer, since shaders access it in every command.
 fn barrier(gpu: &Gpu, commands: vk::CommandBuffer, from: SyncScope, to: SyncScope) {

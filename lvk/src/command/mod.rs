@@ -155,6 +155,9 @@ impl CommandBuffer {
         self.end_transient_steps();
         self.write_label_timestamp(None);
         self.reference_query_pools();
+        if let Some(checks) = &self.shared.bindless.checks {
+            checks.record_end(&self.shared.gpu, self.recording.commands);
+        }
         self.finished = true;
         // SAFETY: `finished` keeps `drop` from taking both again.
         let (recording, state) =

@@ -39,8 +39,10 @@ pub struct CallLog {
     pub dead: BTreeSet<String>,
     /// Commands that used a command buffer which an earlier call had not begun or reset, because it had failed.
     pub unready: BTreeSet<String>,
-    /// Names that were given to objects, and those of physical devices, as errors show them.
+    /// Names that were given to objects, as errors show them.
     pub names: BTreeSet<String>,
+    /// Names of physical devices, likewise.
+    pub devices: BTreeSet<String>,
     /// What the process held at its end.
     pub leftovers: Option<Leftovers>,
 }
@@ -54,6 +56,10 @@ impl CallLog {
             // A name may have several spaces.
             if let Some(name) = line.strip_prefix("name ") {
                 log.names.insert(name.to_owned());
+                continue;
+            }
+            if let Some(name) = line.strip_prefix("device ") {
+                log.devices.insert(name.to_owned());
                 continue;
             }
             let mut words = line.split_whitespace();
@@ -114,6 +120,11 @@ pub(crate) fn fails_line(command: &str) -> String {
 /// Returns the line for the name of an object.
 pub(crate) fn name_line(name: &str) -> String {
     format!("name {name}")
+}
+
+/// Returns the line for the name of a physical device.
+pub(crate) fn device_line(name: &str) -> String {
+    format!("device {name}")
 }
 
 /// Returns the line for a call on a lost device, by another thread than that of the fault.
@@ -180,6 +191,7 @@ pub(crate) mod tests {
             fails_line("vkWaitSemaphores"),
             fails_line("vkWaitSemaphores"),
             name_line("height map,  rough"),
+            device_line("NVIDIA  H200"),
             live_line(&BTreeMap::from([("VkInstance", 0), ("VkBuffer", 2)])),
             orphans_line(&BTreeMap::from([("VkFence", 1)])),
             orphans_line(&BTreeMap::from([("VkFence", 2), ("VkImage", 1)])),
@@ -194,6 +206,7 @@ pub(crate) mod tests {
             calls,
             unready: BTreeSet::from(["vkEndCommandBuffer".to_owned()]),
             names: BTreeSet::from(["height map,  rough".to_owned()]),
+            devices: BTreeSet::from(["NVIDIA  H200".to_owned()]),
             reached: true,
             failed: ["vkCreateBuffer", "vkWaitSemaphores"].map(str::to_owned).into(),
             told_others: BTreeSet::from(["vkWaitSemaphores".to_owned()]),

@@ -16,12 +16,20 @@ pub enum FaultError {
     SurfaceLost,
     /// `VK_ERROR_OUT_OF_DATE_KHR`.
     OutOfDate,
+    /// `VK_SUCCESS` with the address of a failed `mmap`, -1, as lavapipe answers `vkMapMemory` where address space lacks.
+    NoAddress,
 }
 
 impl FaultError {
     /// Every error.
-    pub const ALL: [Self; 5] =
-        [Self::HostMemory, Self::DeviceMemory, Self::DeviceLost, Self::SurfaceLost, Self::OutOfDate];
+    pub const ALL: [Self; 6] = [
+        Self::HostMemory,
+        Self::DeviceMemory,
+        Self::DeviceLost,
+        Self::SurfaceLost,
+        Self::OutOfDate,
+        Self::NoAddress,
+    ];
 
     /// Returns the name of the error in logs.
     #[must_use]
@@ -32,6 +40,7 @@ impl FaultError {
             Self::DeviceLost => "device-lost",
             Self::SurfaceLost => "surface-lost",
             Self::OutOfDate => "out-of-date",
+            Self::NoAddress => "no-address",
         }
     }
 
@@ -40,7 +49,7 @@ impl FaultError {
     #[must_use]
     pub const fn texts(self) -> [&'static str; 3] {
         match self {
-            Self::HostMemory => {
+            Self::HostMemory | Self::NoAddress => {
                 ["out of host memory", "error_out_of_host_memory", "host memory allocation has failed"]
             }
             Self::DeviceMemory => {
@@ -55,7 +64,7 @@ impl FaultError {
     /// True for the errors of memory.
     #[must_use]
     pub const fn is_want_of_memory(self) -> bool {
-        matches!(self, Self::HostMemory | Self::DeviceMemory)
+        matches!(self, Self::HostMemory | Self::DeviceMemory | Self::NoAddress)
     }
 
     /// Returns the error of this name.

@@ -6,9 +6,9 @@ use std::fmt::Debug;
 
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildMode, Context, Dependencies,
-    DeviceInstances, DeviceProfile, Error, Handle, HitGroup, RayTracingLibraryDesc, RayTracingPipelineDesc,
-    RayTracingPipelineHandle, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage, TlasDesc,
-    TlasInstance, Triangles,
+    DeviceInstances, DeviceProfile, Error, Handle, HitGroup, Queue, RayTracingLibraryDesc,
+    RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleDesc, ShaderModuleHandle, ShaderSource,
+    ShaderStage, TlasDesc, TlasInstance, Triangles,
 };
 use lvk_tests::compute::words_buffer;
 use lvk_tests::subprocess::on_swiftshader;
@@ -55,6 +55,11 @@ fn creations(ctx: &Context) -> Vec<String> {
         refusal("create_blas", ctx.create_blas(&blas)),
         refusal("create_blas without geometries", ctx.create_blas(&BlasDesc::default())),
         refusal("create_blas_batch", ctx.create_blas_batch(&[blas, blas])),
+        refusal("create_blas_batch_on", ctx.create_blas_batch_on(Queue::Compute, &[blas])),
+        // SAFETY: there are no bytes that the driver would read.
+        refusal("load_blas", unsafe { ctx.load_blas(&blas, &[]) }),
+        // SAFETY: as before.
+        refusal("load_or_create_blas", unsafe { ctx.load_or_create_blas(&blas, None) }.map(drop)),
         refusal("blas_sizes", ctx.blas_sizes(&blas)),
         refusal("create_tlas", ctx.create_tlas(&TlasDesc::default())),
         refusal("create_tlas with room", ctx.create_tlas(&TlasDesc { capacity: 9, ..Default::default() })),

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::LazyLock;
 
 use crate::held_by::{cells, project};
 
@@ -30,6 +31,29 @@ const HANDLES: [&str; 12] = [
     "SwapchainHandle",
     "TextureHandle",
 ];
+
+/// Public types whose fields or variants hold a handle, themselves or by another such type.
+static HOLDERS_OF_HANDLES: LazyLock<BTreeSet<&'static str>> = LazyLock::new(|| {
+    let parts: Vec<_> = INTERFACE.lines().filter_map(part).collect();
+    let mut holders = BTreeSet::new();
+    loop {
+        let known = holders.len();
+        let holds = |text: &str| words(text).any(|word| HANDLES.contains(&word) || holders.contains(word));
+        let found: Vec<_> = parts.iter().filter(|(_, text)| holds(text)).map(|(name, _)| *name).collect();
+        holders.extend(found);
+        if holders.len() == known {
+            return holders;
+        }
+    }
+});
+
+/// Returns the type of a line with a public field or variant, and the types of what it holds.
+fn part(line: &str) -> Option<(&str, &str)> {
+    let rest = line.strip_prefix("pub lvk::")?;
+    let (name, of) = rest.split_once("::")?;
+    let held = of.split_once(": ").or_else(|| of.split_once('('))?.1;
+    Some((name.split('<').next()?, held))
+}
 
 /// Errors of handles without an object.
 const OF_HANDLES: [&str; 2] = ["StaleHandle", "ForeignHandle"];
@@ -68,8 +92,9 @@ pub struct Call<'a> {
 }
 
 impl Call<'_> {
+    /// True if it takes a handle, or a description that holds one.
     fn takes_handle(&self) -> bool {
-        words(self.arguments).any(|word| HANDLES.contains(&word))
+        words(self.arguments).any(|word| HANDLES.contains(&word) || HOLDERS_OF_HANDLES.contains(word))
     }
 
     /// True if it takes more than handles.
@@ -411,6 +436,10 @@ fn the_interface_is_read() {
     assert_eq!(takes(upload), Some((false, true)));
     assert_eq!(takes(address), Some((false, false)));
     assert_eq!(takes("pub fn lvk::A::b(&self, lvk::BufferHandle, [u32; 2])"), Some((true, true)));
+    assert_eq!(takes("pub fn lvk::A::b(&self, &lvk::BlasDesc<'_>)"), Some((true, true)), "by its geometries");
+    assert_eq!(takes("pub fn lvk::A::b(&self, &lvk::BufferDesc<'_>)"), Some((false, true)));
+    assert_eq!(part("pub lvk::BlasGeometry::Aabbs(lvk::Aabbs)"), Some(("BlasGeometry", "lvk::Aabbs)")));
+    assert_eq!(part("pub fn lvk::A::b(&self, lvk::BufferHandle)"), None);
     assert_eq!(
         variants(
             "pub enum Error {\n    /// A.\n    A {\n        /// B.\n        b: u32,\n    },\n    C(u32),\n}\n"

@@ -240,6 +240,18 @@ fn a_memory_budget_is_kept() -> Result<()> {
     ctx.wait_idle()?;
     assert_eq!(of_structures(&ctx), half, "nothing is left behind");
     made.extend(ctx.create_blas_batch(&more[..COUNT / 2])?);
+    let bytes = ctx.serialize_blas(*made[0])?;
+    let loaded = BlasDesc { debug_name: "loaded", ..descs[0] };
+    // SAFETY: the bytes are those of a BLAS of this description.
+    let answers = unsafe {
+        [ctx.load_blas(&loaded, &bytes).err(), ctx.load_or_create_blas(&loaded, Some(&bytes)).err()]
+    };
+    for answer in answers {
+        assert!(
+            matches!(&answer, Some(Error::OverBudget { object, .. }) if object == "loaded"),
+            "{answer:?}"
+        );
+    }
     let tlas = ctx.create_tlas(&TlasDesc { debug_name: "one more", ..Default::default() });
     assert!(matches!(&tlas, Err(Error::OverBudget { object, .. }) if object == "one more"), "{tlas:?}");
     drop(made);

@@ -11,6 +11,7 @@ use lvk::{
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::pipelines;
 use lvk_tests::raster::{pixels, target};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
 fn checking() -> Option<TestDevice> {
@@ -67,6 +68,28 @@ fn freed_and_unknown_textures_are_named_and_replaced() {
     let again = flat(&ctx, "again", 5.0);
     assert_eq!(fetch.run(&ctx, [again.index(), 0, 0], 1, &none)[0][0], 5.0);
     assert_eq!(ctx.index_faults().unwrap().len(), 3);
+}
+
+#[test]
+fn the_end_of_a_context_logs_faults_that_were_not_asked_for() {
+    capture_warnings();
+    for asks in [false, true] {
+        let Some(ctx) = checking() else { return };
+        let fetch = Evaluator::new(&ctx, FETCH);
+        let gone = flat(&ctx, "gone before the end", 4.0);
+        let bad = gone.index();
+        drop(gone);
+        assert_eq!(fetch.run(&ctx, [bad, 0, 0], 1, &Dependencies::default())[0], MAGENTA);
+        if asks {
+            assert_eq!(ctx.index_faults().unwrap().len(), 1);
+        }
+        drop((fetch, ctx));
+        let lines = take_warnings("'gone before the end' was destroyed");
+        assert_eq!(lines.len(), usize::from(!asks), "{lines:?}");
+        let names =
+            |line: &String| line.contains(&format!("'test shader' used index {bad} of Textures 1 times"));
+        assert!(lines.iter().all(names), "{lines:?}");
+    }
 }
 
 /// Commands that were recorded while the owner was alive may read its slot, whenever they run. Later commands may

@@ -315,7 +315,15 @@ fn accel_structs(ctx: &Context, cmd: &mut CommandBuffer, good: &Handles, bad: &H
         from_buffer(upper, from(bad.buffer, &[lower])),
         from_buffer(upper, from(good.buffer, &[blas])),
     ];
+    let bytes = ctx.serialize_blas(lower).unwrap();
+    // SAFETY: the bytes are those of a BLAS of this device.
+    let load = |bytes| unsafe { ctx.load_blas(&desc, bytes) };
+    // SAFETY: as before.
+    let load_or_create = |bytes| unsafe { ctx.load_or_create_blas(&desc, bytes) };
     let mut answers = vec![
+        ("Context::load_blas", load(&bytes).map(drop)),
+        ("Context::load_or_create_blas", load_or_create(Some(&bytes)).map(drop)),
+        ("Context::load_or_create_blas", load_or_create(None).map(drop)),
         ("Context::create_blas", ctx.create_blas(&desc).map(drop)),
         ("Context::create_blas_batch", ctx.create_blas_batch(&[desc]).map(drop)),
         ("Context::create_blas_batch_on", ctx.create_blas_batch_on(Queue::Compute, &[desc]).map(drop)),

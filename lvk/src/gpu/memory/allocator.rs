@@ -280,9 +280,9 @@ impl DeviceMemory {
     }
 }
 
-/// Allocates memory of the allocator's blocks. If no further block fits on the device, the memory gets an allocation of
-/// exactly its size: a block has up to 256 MiB, and less may be free. The allocator copies the name, which only its own
-/// reports contain.
+/// Allocates memory of the allocator's blocks. If no further block fits on the device or can be mapped, the memory gets an
+/// allocation of exactly its size: a block has up to 256 MiB, and less may be free. The allocator copies the name, which
+/// only its own reports contain.
 fn allocate_dedicated(
     allocator: &mut Allocator,
     name: &str,
@@ -290,21 +290,26 @@ fn allocate_dedicated(
     memory: MemoryKind,
     linear: bool,
 ) -> Allocated<Allocation> {
-    let mut desc = AllocationCreateDesc {
+    let desc = AllocationCreateDesc {
         name,
         requirements,
         location: memory.location(),
         linear,
         allocation_scheme: AllocationScheme::GpuAllocatorManaged,
     };
-    let made = match allocator.allocate(&desc) {
-        Err(AllocationError::OutOfMemory) => {
+    match allocate_mapped(allocator, &desc) {
+        Err(AllocationError::OutOfMemory | AllocationError::FailedToMap(_)) => {
             // A dedicated allocation for no buffer is one for any objects.
-            desc.allocation_scheme = AllocationScheme::DedicatedBuffer(vk::Buffer::null());
-            allocator.allocate(&desc)?
+            let allocation_scheme = AllocationScheme::DedicatedBuffer(vk::Buffer::null());
+            allocate_mapped(allocator, &AllocationCreateDesc { allocation_scheme, ..desc })
         }
-        made => made?,
-    };
+        made => made,
+    }
+}
+
+/// Allocates memory that has a valid address where it is mapped.
+fn allocate_mapped(allocator: &mut Allocator, desc: &AllocationCreateDesc<'_>) -> Allocated<Allocation> {
+    let made = allocator.allocate(desc)?;
     if made.mapped_ptr().is_some_and(|start| !is_mapping(start.addr().get(), made.offset(), made.size())) {
         allocator.free(made)?;
         return Err(AllocationError::FailedToMap("the driver returned no address".to_owned()));

@@ -10,6 +10,8 @@ pub(super) const LOST: u8 = 1;
 pub(super) const SURFACE: u8 = 2;
 /// The command may find the swapchain out of date.
 pub(super) const DATED: u8 = 4;
+/// The command writes the address of mapped memory to its last argument.
+pub(super) const MAPS: u8 = 8;
 
 /// Objects that a command creates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +30,7 @@ pub(super) struct Command {
     pub(super) name: &'static str,
     /// Another name of the same command.
     pub(super) alias: Option<&'static str>,
-    /// The bits [`LOST`], [`SURFACE`] and [`DATED`].
+    /// The bits [`LOST`], [`SURFACE`], [`DATED`] and [`MAPS`].
     pub(super) answers: u8,
     /// Objects that it creates.
     pub(super) creates: Creates,
@@ -139,7 +141,7 @@ commands! {
         PFN_vkQueueWaitIdle one [LOST];
         PFN_vkDeviceWaitIdle one [LOST];
         PFN_vkAllocateMemory four makes "VkDeviceMemory";
-        PFN_vkMapMemory six;
+        PFN_vkMapMemory six [MAPS];
         PFN_vkFlushMappedMemoryRanges three;
         PFN_vkInvalidateMappedMemoryRanges three;
         PFN_vkBindBufferMemory four;
@@ -226,7 +228,7 @@ commands! {
         PFN_vkCopyImageToMemoryEXT two;
         PFN_vkCopyImageToImageEXT two;
         PFN_vkTransitionImageLayoutEXT three;
-        PFN_vkMapMemory2KHR three;
+        PFN_vkMapMemory2KHR three [MAPS];
         PFN_vkUnmapMemory2KHR two;
         PFN_vkReleaseSwapchainImagesEXT two [SURFACE];
         PFN_vkQueueSubmit2 four [LOST] alias "vkQueueSubmit2KHR";

@@ -13,7 +13,7 @@ use ash::vk::Handle;
 use lvk::readable_bytes;
 
 use super::command_buffers::CommandBuffers;
-use super::commands::{Creates, DATED, LOST, SURFACE};
+use super::commands::{Creates, DATED, LOST, MAPS, SURFACE};
 use super::dispatch::{COMMANDS, table_of};
 use crate::call_log;
 use crate::fault::{Fault, FaultError};
@@ -49,7 +49,7 @@ struct Counts {
     /// Live objects by the handle of their device or instance, and by kind.
     live: BTreeMap<(u64, &'static str), Handles>,
     command_buffers: CommandBuffers,
-    /// Names that are in the log.
+    /// Lines with names that are in the log.
     names: BTreeSet<String>,
 }
 
@@ -97,11 +97,23 @@ impl Injector {
         error.map(result_of)
     }
 
-    /// True for a presentation to a surface that is lost or has changed: Vulkan still executes its waits for semaphores.
+    /// True for a presentation to a surface that is lost or has changed, as Vulkan still executes its waits for semaphores, and for a
+    /// mapping without an address, which its owner ends.
     pub(super) fn still_executes(&self, number: usize, fault: vk::Result) -> bool {
         let is_of_surface =
             matches!(fault, vk::Result::ERROR_SURFACE_LOST_KHR | vk::Result::ERROR_OUT_OF_DATE_KHR);
-        COMMANDS[number].name == "vkQueuePresentKHR" && is_of_surface
+        fault == vk::Result::SUCCESS || COMMANDS[number].name == "vkQueuePresentKHR" && is_of_surface
+    }
+
+    /// Gives a mapping that is to have no address the one of a failed `mmap`.
+    ///
+    /// # Safety
+    /// `words` are the arguments of the call, which has returned. The last points to an address if `fault` is a success.
+    pub(super) unsafe fn maps(&self, words: &[u64], fault: vk::Result) {
+        if fault == vk::Result::SUCCESS {
+            // SAFETY: by contract.
+            unsafe { (words[words.len() - 1] as usize as *mut usize).write(usize::MAX) };
+        }
     }
 
     /// Notes that a call which [`called`](Self::called) let pass has returned.
@@ -174,7 +186,7 @@ impl Injector {
             (*info).object_name_as_c_str()
         };
         if let Some(name) = name {
-            self.log_name(name);
+            self.log_name(name, call_log::name_line);
         }
     }
 
@@ -216,17 +228,17 @@ impl Injector {
                 let mut properties = vk::PhysicalDeviceProperties::default();
                 properties_of(devices.add(index).read(), &mut properties);
                 if let Ok(name) = properties.device_name_as_c_str() {
-                    self.log_name(name);
+                    self.log_name(name, call_log::device_line);
                 }
             }
         }
     }
 
-    /// Logs a name the first time.
-    fn log_name(&self, name: &CStr) {
-        let shown = readable_bytes(name.to_bytes());
-        if self.counts().names.insert(shown.clone()) {
-            self.write(&call_log::name_line(&shown));
+    /// Logs a name the first time, by the line that `line` makes.
+    fn log_name(&self, name: &CStr, line: fn(&str) -> String) {
+        let line = line(&readable_bytes(name.to_bytes()));
+        if self.counts().names.insert(line.clone()) {
+            self.write(&line);
         }
     }
 
@@ -302,9 +314,12 @@ impl Injector {
 /// Returns the errors that a command with these bits may answer.
 fn errors_of(answers: u8) -> Vec<FaultError> {
     let mut errors = vec![FaultError::HostMemory, FaultError::DeviceMemory];
-    for (bit, error) in
-        [(LOST, FaultError::DeviceLost), (SURFACE, FaultError::SurfaceLost), (DATED, FaultError::OutOfDate)]
-    {
+    for (bit, error) in [
+        (LOST, FaultError::DeviceLost),
+        (SURFACE, FaultError::SurfaceLost),
+        (DATED, FaultError::OutOfDate),
+        (MAPS, FaultError::NoAddress),
+    ] {
         if answers & bit != 0 {
             errors.push(error);
         }
@@ -319,6 +334,7 @@ fn result_of(error: FaultError) -> vk::Result {
         FaultError::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
         FaultError::SurfaceLost => vk::Result::ERROR_SURFACE_LOST_KHR,
         FaultError::OutOfDate => vk::Result::ERROR_OUT_OF_DATE_KHR,
+        FaultError::NoAddress => vk::Result::SUCCESS,
     }
 }
 

@@ -46,6 +46,8 @@ macro_rules! wrapper {
                 // SAFETY: the arguments are those of the caller.
                 let result = unsafe { next($($argument),+) };
                 if let Some(fault) = fault {
+                    // SAFETY: these are the arguments of the call; only a command that maps memory succeeds by a fault.
+                    unsafe { injector().maps(&words, fault) };
                     return fault;
                 }
                 injector().returned(N, words[0]);

@@ -116,10 +116,7 @@ mod tests {
             text,
             &Fault { command: command.into(), call: 1, error, span },
             &RunOutcome { failed, ..refused() },
-            &RunOutcome {
-                names: ["rain", "main", "a", "rays", "llvmpipe"].map(str::to_owned).into(),
-                ..clean()
-            },
+            &RunOutcome { names: ["rain", "main", "a", "rays"].map(str::to_owned).into(), ..clean() },
         )
     }
 

@@ -30,7 +30,7 @@ pub enum Instead {
     LosesName,
 }
 
-use FaultError::{DeviceLost, DeviceMemory, HostMemory, OutOfDate, SurfaceLost};
+use FaultError::{DeviceLost, DeviceMemory, HostMemory, NoAddress, OutOfDate, SurfaceLost};
 use Instead::{AsksAgain, BeginsLater, CallsAgain, LosesName, RemakesSwapchain, WaitsOtherwise};
 
 const fn fallback(command: &'static str, errors: &'static [FaultError], instead: Instead) -> Fallback {
@@ -46,7 +46,7 @@ pub const FALLBACKS: &[Fallback] = &[
     fallback("vkAllocateMemory", &[HostMemory, DeviceMemory], CallsAgain),
     fallback("vkCreateBuffer", &[DeviceMemory], CallsAgain),
     fallback("vkBindBufferMemory", &[DeviceMemory], CallsAgain),
-    fallback("vkMapMemory", &[HostMemory, DeviceMemory], CallsAgain),
+    fallback("vkMapMemory", &[HostMemory, DeviceMemory, NoAddress], CallsAgain),
     fallback("vkCreateAccelerationStructureKHR", &[DeviceMemory], CallsAgain),
     fallback("vkQueueWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], WaitsOtherwise),
     fallback("vkGetSemaphoreCounterValue", &[HostMemory, DeviceMemory], AsksAgain),
@@ -102,6 +102,7 @@ mod tests {
             FaultError::DeviceLost => "device lost",
             FaultError::SurfaceLost => "surface lost",
             FaultError::OutOfDate => "out of date",
+            FaultError::NoAddress => "no address",
         }
     }
 

@@ -37,6 +37,9 @@ const COMMAND_BUFFER: &[&str] =
     &["vkCreateCommandPool", "vkAllocateCommandBuffers", "vkResetCommandPool", "vkBegin", "vkEnd"];
 const MEMORY: &[&str] = &["vkCreateBuffer", "vkAllocateMemory", "vkBindBufferMemory", "vkMapMemory"];
 
+/// Starts of the commands whose errors name a physical device.
+const PHYSICAL_DEVICE: &[&str] = &["vkEnumerateDevice", "vkGetPhysicalDevice", "vkCreateDevice"];
+
 /// Start of the names that the library makes of the name of another object.
 const READ_BACK: &str = "readback of ";
 
@@ -46,6 +49,7 @@ const FORMAT_QUERY: &str = "vkGetPhysicalDeviceImageFormatProperties";
 /// The objects that errors of one run may name.
 pub(super) struct KnownObjects<'a> {
     names: BTreeSet<&'a str>,
+    devices: BTreeSet<&'a str>,
     files: BTreeSet<&'a str>,
 }
 
@@ -54,9 +58,11 @@ impl<'a> KnownObjects<'a> {
     pub(super) fn of(found: &'a RunOutcome, clean: &'a RunOutcome) -> Self {
         let both = [found, clean];
         let names = both.iter().flat_map(|outcome| &outcome.names);
+        let devices = both.iter().flat_map(|outcome| &outcome.devices);
         let files = both.iter().flat_map(|outcome| &outcome.files);
         Self {
             names: names.map(String::as_str).filter(|name| !name.is_empty()).collect(),
+            devices: devices.map(String::as_str).collect(),
             files: files.map(String::as_str).filter(|file| file.starts_with("caches/")).collect(),
         }
     }
@@ -87,6 +93,7 @@ impl<'a> KnownObjects<'a> {
             |name: &&str| starts_with(quoted, name) || source.is_some_and(|source| starts_with(source, name));
         let is_unnamed = |(name, starts): &(&str, &[&str])| concerns(starts) && starts_with(quoted, name);
         self.names.iter().any(is_named)
+            || concerns(PHYSICAL_DEVICE) && self.devices.iter().any(|name| starts_with(quoted, name))
             || UNNAMED_OBJECTS.iter().any(is_unnamed)
             || command.starts_with(FORMAT_QUERY)
                 && Format::ALL.iter().any(|format| starts_with(quoted, &format!("{format:?}")))
@@ -113,7 +120,8 @@ mod tests {
     #[test]
     fn only_objects_of_the_program_count() {
         let names = ["rain", "the sky's colour", ""].map(str::to_owned).into();
-        let (found, without) = (clean(), RunOutcome { names, ..clean() });
+        let devices = ["llvmpipe".to_owned()].into();
+        let (found, without) = (clean(), RunOutcome { names, devices, ..clean() });
         let objects = KnownObjects::of(&found, &without);
         for (command, rest) in [
             ("vkCreateBuffer", " for 'rain'"),
@@ -121,6 +129,7 @@ mod tests {
             ("vkCreateImage", " for 'the sky's colour'; create it later"),
             ("vkMapMemory", " for 'readback of rain'"),
             ("vkQueueSubmit2", " for 'compute queue'; create a new context"),
+            ("vkCreateDevice", " for 'llvmpipe'"),
             ("vkGetPhysicalDeviceImageFormatProperties", " for 'Rgba8Unorm'"),
             ("vkGetPipelineCacheData", " for '/var/run/caches/pipelines'"),
         ] {
@@ -132,6 +141,7 @@ mod tests {
             ("vkCreateBuffer", " for ''"),
             ("vkCreateBuffer", " for 'snow'"),
             ("vkCreateBuffer", " for 'rain and snow'"),
+            ("vkCreateBuffer", " for 'llvmpipe'"),
             ("vkCreateBuffer", " for 'compute queue'"),
             ("vkCreateImage", " for 'Rgba8Unorm'"),
             ("vkCreateImage", " for 'readback of rain'"),

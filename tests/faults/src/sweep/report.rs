@@ -82,7 +82,7 @@ impl fmt::Display for SweepReport {
         write!(
             out,
             "{calls} calls of {commands} commands, {runs} of {planned} faults, {reached} reached, {missed} missed, \
-             {refused} errors, {succeeded} successes, {leaked} contexts leaked, {} flawed, {} s",
+             {refused} errors, {succeeded} successes, {leaked} runs leaked a context, {} flawed, {} s",
             flawed.len(),
             time.as_secs()
         )?;

@@ -141,6 +141,7 @@ fn run_in(
         dead: log.dead,
         unready: log.unready,
         names: log.names,
+        devices: log.devices,
         leftovers: log.leftovers,
         result: fs::read(out.join(FIRST)).ok(),
         second_result: fs::read(out.join(SECOND)).ok(),

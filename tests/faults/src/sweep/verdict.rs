@@ -49,8 +49,10 @@ pub struct RunOutcome {
     pub dead: BTreeSet<String>,
     /// Commands that used a command buffer which an earlier call had not begun or reset, because it had failed.
     pub unready: BTreeSet<String>,
-    /// Names of objects and of physical devices. A run without a fault has those that it gives to a tool, too.
+    /// Names of objects. A run without a fault has those that it gives to a tool, too.
     pub names: BTreeSet<String>,
+    /// Names of physical devices.
+    pub devices: BTreeSet<String>,
     /// What the process held at its end.
     pub leftovers: Option<Leftovers>,
     /// The result of the first try, a picture or values. `None` if it was not written.
@@ -293,6 +295,7 @@ pub(super) mod tests {
             calls: Vec::new(),
             unready: BTreeSet::new(),
             names: BTreeSet::from(["rain".to_owned()]),
+            devices: BTreeSet::from(["llvmpipe".to_owned()]),
             failed: BTreeSet::new(),
             told_others: BTreeSet::new(),
             counts_objects: true,

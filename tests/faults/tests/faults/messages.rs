@@ -43,6 +43,17 @@ fn shortages_in_questions_are_no_lack_of_support() {
     }
 }
 
+/// A driver that lacks address space answers success without an address. The allocator asks for a smaller block, and then reports
+/// the shortage.
+#[test]
+fn mappings_without_an_address_are_shortages() {
+    let raw = clean(program("raw_device"));
+    let smaller = assert_reached(&raw, "vkMapMemory 1 no-address once");
+    assert_eq!(smaller.ending, Ending::Status(0), "{}", smaller.stderr);
+    let none = assert_reached(&raw, "vkMapMemory 1 no-address stays");
+    assert!(error_line(&none).contains("out of host memory in vkMapMemory for '"), "{}", none.stderr);
+}
+
 /// Every fault of commands that few programs call: handles of shader groups, sizes of fragments, modifiers of shared images.
 #[test]
 fn commands_of_few_programs_fail_as_others_do() {

@@ -10,6 +10,9 @@ use lvk_faults::fault::Span;
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
 use lvk_faults::sweep::run::{Caches, Program};
+use lvk_samples::app::cli::command;
+use lvk_samples::catalogue::SAMPLES;
+use lvk_viewer::Viewer;
 
 use crate::{WINDOWED, assert_validated, in_window, program, validated, varies};
 
@@ -57,13 +60,18 @@ fn whole_of(name: &str, line: &str, program: &Program, plan: &SweepPlan) {
 
 /// Declares an ignored test for each scenario.
 macro_rules! whole_sweeps {
-    ($($test:ident: $line:literal;)*) => {$(
-        #[test]
-        #[ignore = "minutes: .ci/slow faults"]
-        fn $test() {
-            whole(stringify!($test), $line, &program($line));
-        }
-    )*};
+    ($($test:ident: $line:literal;)*) => {
+        /// The programs of all these sweeps.
+        const LINES: &[&str] = &[$($line),*];
+
+        $(
+            #[test]
+            #[ignore = "minutes: .ci/slow faults"]
+            fn $test() {
+                whole(stringify!($test), $line, &program($line));
+            }
+        )*
+    };
 }
 
 whole_sweeps! {
@@ -123,6 +131,23 @@ whole_sweeps! {
     whole_raw_device: "raw_device";
     whole_hot_reload: "hot_reload";
     whole_interop: "interop";
+}
+
+#[test]
+fn every_sample_has_a_sweep_of_each_of_its_paths() {
+    let samples = SAMPLES.iter().map(|sample| (sample.command)()).chain([command::<Viewer>()]);
+    for sample in samples {
+        let name = sample.get_name();
+        let paths: &[&str] = match sample.get_arguments().any(|argument| argument.get_id() == "rt") {
+            true => &["hardware", "pipeline", "query", "software"],
+            false => &[""],
+        };
+        for path in paths {
+            let of_path = |line: &&&str| line.split(' ').any(|word| path.is_empty() || word == *path);
+            let is_swept = LINES.iter().filter(of_path).any(|line| line.split(' ').next() == Some(name));
+            assert!(is_swept, "no sweep of {name} {path}");
+        }
+    }
 }
 
 /// The example opens the loader that the dynamic linker finds.
