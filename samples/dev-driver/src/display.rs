@@ -1,5 +1,6 @@
 //! A headless X server (Xvfb) for programs that open windows.
 
+use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -21,13 +22,25 @@ impl VirtualDisplay {
         &self.name
     }
 
-    /// Sets the environment of `program` so that it opens its windows on this display. Adds the downloaded client libraries if
-    /// the server was downloaded.
+    /// Sets the environment of `program` so that it opens its windows on this display.
     pub fn attach(&self, program: &mut Command) {
-        program.env("DISPLAY", &self.name).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+        program.envs(self.variables());
+    }
+
+    /// Returns the environment variables of programs that open their windows on this display. If the server was downloaded, so are
+    /// the client libraries and the keyboard descriptions.
+    pub fn variables(&self) -> Vec<(&'static str, OsString)> {
+        // An empty name is none.
+        let mut variables = vec![
+            ("DISPLAY", OsString::from(&self.name)),
+            ("WAYLAND_DISPLAY", OsString::new()),
+            ("WAYLAND_SOCKET", OsString::new()),
+        ];
         if let Some(folder) = &self.install_folder {
-            program.env("LD_LIBRARY_PATH", folder.join("lib")).env("XKB_CONFIG_ROOT", folder.join(KEYBOARDS));
+            variables.push(("LD_LIBRARY_PATH", folder.join("lib").into()));
+            variables.push(("XKB_CONFIG_ROOT", folder.join(KEYBOARDS).into()));
         }
+        variables
     }
 
     /// Starts the system's Xvfb; `None` if Xvfb or xkbcomp is not installed.

@@ -142,6 +142,23 @@ fn shaders_are_compiled_as_they_change_and_wrong_ones_are_reported() {
     session.close();
 }
 
+/// winit panics then, which is no way to end a program.
+#[test]
+fn a_window_without_keyboard_descriptions_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(desktop) = desktop() else { return };
+    let mut command = sample(env!("CARGO_BIN_EXE_hello_triangle"), &["--window"], folder.path());
+    desktop.attach(&mut command);
+    for variable in ["XKB_CONFIG_ROOT", "XKB_CONFIG_EXTRA_PATH", "XDG_CONFIG_HOME", "HOME"] {
+        command.env(variable, folder.path().join("nowhere"));
+    }
+    let output = command.output().unwrap();
+    let (_, err) = texts(&output);
+    assert_eq!(output.status.code(), Some(1), "{err}");
+    assert!(err.contains("no window can be opened") && err.contains("xkb-data"), "{err}");
+    assert!(!err.contains("panicked"), "{err}");
+}
+
 #[test]
 fn windows_that_cannot_be_are_refused() {
     let folder = tempfile::tempdir().unwrap();

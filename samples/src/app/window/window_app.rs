@@ -1,5 +1,6 @@
 //! The program of a sample that has a window: events in, frames out.
 
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -9,7 +10,7 @@ use lvk::{Context, ShaderFiles, SubmitHandle, ValidationSink, WindowHandles};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, WindowEvent};
-use winit::event_loop::{ActiveEventLoop, ControlFlow};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
 
@@ -48,7 +49,7 @@ where
     S: Sample,
     M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 {
-    let event_loop = event_loop.build().map_err(|error| RunError::window(&error))?;
+    let event_loop = built(event_loop)?;
     let mut program =
         WindowApp { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
     event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
@@ -56,6 +57,19 @@ where
     let closed = running.map_or(Ok(()), Running::close);
     ended?;
     closed
+}
+
+/// Builds the event loop. winit panics where the keyboard descriptions of X11 are missing: that is an error, too.
+fn built(event_loop: &mut EventLoopBuilder) -> Result<EventLoop<()>, RunError> {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    let built = std::panic::catch_unwind(AssertUnwindSafe(|| event_loop.build()));
+    std::panic::set_hook(hook);
+    let missing = || RunError::NoWindow {
+        reason: "the keyboard descriptions of X11 cannot be read; install xkb-data and libxkbcommon-x11-0"
+            .to_owned(),
+    };
+    built.map_err(|_| missing())?.map_err(|error| RunError::window(&error))
 }
 
 /// The handler of events.

@@ -73,7 +73,9 @@ fn in_window() -> Option<(RustConnection, VirtualDisplay, Program)> {
             return None;
         }
     };
-    let variables = vec![("DISPLAY".to_owned(), display.name().to_owned())];
+    let text = |value: std::ffi::OsString| value.into_string().unwrap();
+    let variables =
+        display.variables().into_iter().map(|(name, value)| (name.to_owned(), text(value))).collect();
     let (connection, _) = RustConnection::connect(Some(display.name())).unwrap();
     Some((connection, display, Program { variables, ..program("window") }))
 }
