@@ -403,7 +403,7 @@ fn has_work_ended(failure: IdleFailure, poll: impl FnOnce() -> bool) -> bool {
     failure.result == vk::Result::ERROR_DEVICE_LOST || poll()
 }
 
-/// Waits for the queues. A wait that fails for want of memory is tried again for about a second: objects that the device
+/// Waits for the queues. A wait that fails for lack of memory is tried again for about a second: objects that the device
 /// still uses must not be destroyed, and the work that is under way ends in the meantime.
 fn persistent_wait(
     mut wait: impl FnMut() -> Result<(), IdleFailure>,
@@ -421,7 +421,7 @@ fn persistent_wait(
 }
 
 /// Waits for a minute at most until `is_done`, where a wait of the device fails. Questions that fail for
-/// want of memory too are asked again for a second. Returns true if the device no longer uses any object: the work is done, or the
+/// lack of memory too are asked again for a second. Returns true if the device no longer uses any object: the work is done, or the
 /// device is lost. Returns false if the work never was done, or it cannot be known.
 fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl FnMut(Duration)) -> bool {
     const PAUSE: Duration = Duration::from_millis(20);

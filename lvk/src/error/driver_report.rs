@@ -29,7 +29,7 @@ pub enum LoaderReport {
     Opened {
         /// File of the loader, or the name that was opened where the file is unknown.
         path: PathBuf,
-        /// Vulkan version of the loader: major, minor, patch. `None` if `vkEnumerateInstanceVersion` failed, as for want of memory.
+        /// Vulkan version of the loader: major, minor, patch. `None` if `vkEnumerateInstanceVersion` failed, as for lack of memory.
         version: Option<(u32, u32, u32)>,
     },
     /// The loader could not be opened.

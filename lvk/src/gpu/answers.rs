@@ -36,7 +36,7 @@ pub(crate) fn listed<T: Clone + Default>(
 /// Returns the answer of `command` about an image: `None` if the driver does not support it. `name` is the object in the error.
 ///
 /// # Errors
-/// Every other error of the command, such as want of memory, which says nothing about the image.
+/// Every other error of the command, such as a shortage of memory, which says nothing about the image.
 pub(crate) fn image_support<T>(
     answer: Result<T, vk::Result>,
     command: &'static str,

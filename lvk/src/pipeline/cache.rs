@@ -106,7 +106,7 @@ fn read_if_present(path: &Path) -> Option<Vec<u8>> {
     None
 }
 
-/// Creates a cache from `data` through `create`, or an empty one if the driver rejects `data`. Want of memory rejects nothing: a cache
+/// Creates a cache from `data` through `create`, or an empty one if the driver rejects `data`. A shortage of memory rejects nothing: a cache
 /// that is dropped for it would be lost, since the file is written again in the end.
 fn create_from<'a>(
     path: &Path,
@@ -127,7 +127,7 @@ fn create_from<'a>(
     }
 }
 
-/// True if a command failed for want of memory, which says nothing about its data.
+/// True if a command failed for lack of memory, which says nothing about its data.
 fn is_shortage(result: vk::Result) -> bool {
     matches!(result, vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)
 }
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn want_of_memory_is_an_error_and_drops_no_data() {
+    fn a_shortage_of_memory_is_an_error_and_drops_no_data() {
         for (failure, what) in [
             (vk::Result::ERROR_OUT_OF_HOST_MEMORY, "host"),
             (vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, "device"),

@@ -63,7 +63,7 @@ impl FaultError {
 
     /// True for the errors of memory.
     #[must_use]
-    pub const fn is_want_of_memory(self) -> bool {
+    pub const fn is_shortage(self) -> bool {
         matches!(self, Self::HostMemory | Self::DeviceMemory | Self::NoAddress)
     }
 
@@ -81,7 +81,7 @@ pub enum Span {
     Once,
     /// The call and all later ones of the same command.
     Command,
-    /// The call and all later ones of every command, as far as the command may answer the error. Want of memory spares
+    /// The call and all later ones of every command, as far as the command may answer the error. A shortage of memory spares
     /// questions about the progress of work ([`PROGRESS`]), so that a context can learn that its work has ended.
     Stays,
     /// The same, and questions about the progress of work fail too.
@@ -112,7 +112,7 @@ impl Span {
         match self {
             Self::Once => false,
             Self::Command => command == of,
-            Self::Stays => command != PROGRESS || !error.is_want_of_memory(),
+            Self::Stays => command != PROGRESS || !error.is_shortage(),
             Self::Unanswered => true,
         }
     }
@@ -190,7 +190,7 @@ mod tests {
             assert!(!goes_on(Span::Once, error, "vkMapMemory"));
             assert!(goes_on(Span::Command, error, "vkMapMemory") && !goes_on(Span::Command, error, PROGRESS));
             assert!(goes_on(Span::Stays, error, "vkQueueWaitIdle"));
-            assert_eq!(goes_on(Span::Stays, error, PROGRESS), !error.is_want_of_memory());
+            assert_eq!(goes_on(Span::Stays, error, PROGRESS), !error.is_shortage());
             assert!(goes_on(Span::Unanswered, error, PROGRESS));
         }
     }

@@ -29,9 +29,9 @@ pub enum FaultReport {
     Overstated,
     /// Thousands of addresses.
     Many,
-    /// The first call fails for want of host memory.
+    /// The first call fails for lack of host memory.
     NoCounts,
-    /// The second call fails for want of device memory.
+    /// The second call fails for lack of device memory.
     NoLists,
 }
 

@@ -64,3 +64,14 @@ fn a_section_ends_at_the_next_heading_of_its_level() {
 fn code_words_stand_in_backticks() {
     assert_eq!(code_words("never `of`, tell or `note`.").collect::<Vec<_>>(), ["of", "note"]);
 }
+
+#[test]
+fn the_checks_of_the_slow_lane_are_listed() {
+    let script = std::fs::read_to_string(project().join(".ci/slow")).unwrap();
+    let (_, checks) = script.split_once("\nreadonly checks=(").unwrap();
+    let checks: Vec<&str> = checks.split(')').next().unwrap().split_whitespace().collect();
+    let page = contributing();
+    let (_, listed) = page.split_once("`.ci/slow` runs the checks ").unwrap();
+    let listed: Vec<&str> = code_words(listed.split(" and ends at").next().unwrap()).collect();
+    assert_eq!(listed, checks);
+}

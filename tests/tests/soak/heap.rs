@@ -106,7 +106,7 @@ fn create_each(ctx: &Context, vertices: BufferHandle) -> [(&'static str, u64, Re
     ]
 }
 
-/// Frames of one context, and how many of them were refused for want of memory.
+/// Frames of one context, and how many of them were refused for lack of memory.
 struct Life<'a> {
     ctx: &'a Context,
     scene: Scene,

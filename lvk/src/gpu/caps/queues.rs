@@ -18,7 +18,7 @@ pub(crate) struct IdleFailure {
 }
 
 impl IdleFailure {
-    /// True if the wait failed for want of memory.
+    /// True if the wait failed for lack of memory.
     pub(crate) fn lacks_memory(self) -> bool {
         use vk::Result as Code;
         matches!(self.result, Code::ERROR_OUT_OF_HOST_MEMORY | Code::ERROR_OUT_OF_DEVICE_MEMORY)

@@ -262,7 +262,7 @@ pub(super) fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration 
 
 impl PhysicalDevice {
     /// Selects the family whose queues present to the window, or records that the device has no such family. Another error
-    /// than want of memory is recorded too, since another device may present.
+    /// than a shortage of memory is recorded too, since another device may present.
     pub(crate) fn select_present_queue(&mut self, family: Result<Option<u32>>) -> Result<()> {
         const QUEUE: &str = "a queue for graphics and compute that presents to the window";
         match family {

@@ -48,7 +48,7 @@ fn waits_otherwise(command: &str, error: FaultError, calls: &[Call]) -> bool {
         !call.fails && matches!(&*call.command, "vkQueueWaitIdle" | "vkWaitSemaphores" | PROGRESS)
     });
     let failure = calls.iter().position(|call| call.fails && call.command == command);
-    work < failure && (!error.is_want_of_memory() || work < end)
+    work < failure && (!error.is_shortage() || work < end)
 }
 
 /// True if the creation of a swapchain lies between each failure of `command` and the next acquisition.

@@ -224,13 +224,13 @@ fn judge_next(next: &NextStart, clean: &RunOutcome) -> Option<Flaw> {
 }
 
 /// True if the library says that it leaks a context whose work cannot be waited for: every wait and every question about its
-/// progress fails for want of memory, so that the device may still use the objects. Each such context accounts for one device that is alive, or that an
+/// progress fails for lack of memory, so that the device may still use the objects. Each such context accounts for one device that is alive, or that an
 /// engine has destroyed before the objects of its guest, and for one instance: what others leak is a flaw. Objects are counted when an instance is
 /// created or destroyed, so what a leaked context has is not known.
 #[must_use]
 pub fn leaks_on_purpose(fault: Option<&Fault>, found: &RunOutcome) -> bool {
     let is_unanswered =
-        fault.is_some_and(|fault| fault.span == Span::Unanswered && fault.error.is_want_of_memory());
+        fault.is_some_and(|fault| fault.span == Span::Unanswered && fault.error.is_shortage());
     let live = |kind: &str| found.live.get(kind).copied().unwrap_or_default();
     let contexts = found.stderr.matches(LEAKED).count();
     let accounts = live("VkDevice") + found.orphaning <= contexts && live("VkInstance") <= contexts;
