@@ -95,6 +95,21 @@ fn cpu_builds_are_timed_phase_by_phase_for_each_number_of_threads() {
 }
 
 #[test]
+#[ignore = "needs Embree: .ci/slow embree"]
+fn builds_are_compared_with_those_of_embree() {
+    let library = std::env::var("LVK_EMBREE").unwrap();
+    let table = table(&["builds", "--quick", "--threads", "1,2", "--embree", &library]);
+    for name in [
+        "total of Embree, medium quality",
+        "total of Embree, high quality",
+        "tree of Embree, medium: SAH cost",
+    ] {
+        assert!(table.contains(name), "{name}: {table}");
+    }
+    assert!(table.contains(" bounce rays, each ") && !table.contains("WITH OTHER HITS"), "{table}");
+}
+
+#[test]
 fn builds_and_sizes_are_compared_with_hand_written_vulkan() {
     let table = table(&["compaction", "--quick"]);
     for name in
