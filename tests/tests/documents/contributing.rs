@@ -66,7 +66,7 @@ fn code_words_stand_in_backticks() {
 }
 
 #[test]
-fn the_checks_of_the_slow_lane_are_listed() {
+fn every_slow_check_is_listed() {
     let script = std::fs::read_to_string(project().join(".ci/slow")).unwrap();
     let (_, checks) = script.split_once("\nreadonly checks=(").unwrap();
     let checks: Vec<&str> = checks.split(')').next().unwrap().split_whitespace().collect();
