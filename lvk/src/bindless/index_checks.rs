@@ -163,6 +163,11 @@ pub(crate) struct IndexChecks {
     known: Mutex<SlotOwners>,
 }
 
+/// Returns the number of accesses of all faults.
+fn accesses_of(faults: &[IndexFault]) -> u32 {
+    faults.iter().fold(0, |sum: u32, fault| sum.wrapping_add(fault.count))
+}
+
 #[derive(Default)]
 struct SlotOwners {
     /// The current or last owner of a slot.
@@ -283,16 +288,21 @@ impl IndexChecks {
     pub(crate) fn log_faults(&self) {
         let mut words = vec![0_u32; Self::fault_bytes() as usize / 4];
         self.buffer.read(0, bytemuck::cast_slice_mut(&mut words));
-        let reported = self.reported.load(Ordering::Relaxed);
-        let faults = self.faults(&words);
-        if self.reported.load(Ordering::Relaxed) != reported {
+        let faults = self.decode_faults(&words);
+        if accesses_of(&faults) != self.reported.load(Ordering::Relaxed) {
             faults.iter().for_each(|fault| log::error!("{fault}"));
         }
     }
 
     /// Returns the faults in a copy of the buffer's first [`fault_bytes`](Self::fault_bytes), sorted by array, index
-    /// and shader.
-    pub(crate) fn faults(&self, words: &[u32]) -> Vec<IndexFault> {
+    /// and shader, for the application: [`log_faults`](Self::log_faults) logs nothing unless others come.
+    pub(crate) fn report_faults(&self, words: &[u32]) -> Vec<IndexFault> {
+        let faults = self.decode_faults(words);
+        self.reported.store(accesses_of(&faults), Ordering::Relaxed);
+        faults
+    }
+
+    fn decode_faults(&self, words: &[u32]) -> Vec<IndexFault> {
         let (entries, _) =
             words.get(ENTRIES as usize..).unwrap_or(&[]).as_chunks::<{ ENTRY_WORDS as usize }>();
         let lost = words.get(LOST).copied().unwrap_or(0);
@@ -303,8 +313,6 @@ impl IndexChecks {
         }
         let mut faults: Vec<_> = entries.iter().filter_map(|entry| self.decode_fault(entry)).collect();
         faults.sort_by(|a, b| (a.array, a.index, &a.shader).cmp(&(b.array, b.index, &b.shader)));
-        let accesses = faults.iter().fold(0, |sum: u32, fault| sum.wrapping_add(fault.count));
-        self.reported.store(accesses, Ordering::Relaxed);
         faults
     }
 

@@ -41,9 +41,9 @@ pub struct ContextDesc<'a> {
     /// Makes shaders check every index of a bindless array before use. A wrong index is recorded with the name of the
     /// object that it belonged to, for [`Context::index_faults`](crate::Context::index_faults); the access uses the
     /// default descriptor of slot 0. A texture that lacks a declaration in [`Dependencies`](crate::Dependencies) is
-    /// recorded too. The end of the context logs what was not asked for. For debugging only: every access costs several memory reads, commands no longer overlap, and
-    /// pipelines are compiled again in every run. See the manual's page on [debugging](crate::manual::debugging).
-    /// Default: false.
+    /// recorded too. The end of the context logs the faults unless all of them were asked for. For debugging only: every
+    /// access costs several memory reads, commands no longer overlap, and pipelines are compiled again in every run. See
+    /// the manual's page on [debugging](crate::manual::debugging). Default: false.
     pub check_indices: bool,
     /// Request for ray tracing pipelines, and for the path of their implementation: the device's own pipelines, or
     /// compute shaders that the library makes of them. [`Capabilities`](crate::Capabilities) reports the chosen path and

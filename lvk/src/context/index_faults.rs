@@ -25,6 +25,6 @@ impl Context {
                 &[BufferCopy { source_offset: 0, target_offset: 0, size: bytes }],
             )
         })?;
-        Ok(checks.faults(&words))
+        Ok(checks.report_faults(&words))
     }
 }

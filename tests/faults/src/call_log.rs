@@ -39,12 +39,28 @@ pub struct CallLog {
     pub dead: BTreeSet<String>,
     /// Commands that used a command buffer which an earlier call had not begun or reset, because it had failed.
     pub unready: BTreeSet<String>,
-    /// Names that were given to objects, as errors show them.
-    pub names: BTreeSet<String>,
+    /// Objects that were given names.
+    pub names: BTreeSet<NamedObject>,
     /// Names of physical devices, likewise.
     pub devices: BTreeSet<String>,
     /// What the process held at its end.
     pub leftovers: Option<Leftovers>,
+}
+
+/// An object that was given a name.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct NamedObject {
+    /// Kind, as `ash` writes a `VkObjectType`: `BUFFER`.
+    pub kind: String,
+    /// Name, as errors show it.
+    pub name: String,
+}
+
+impl NamedObject {
+    fn parse(text: &str) -> Option<Self> {
+        let (kind, name) = text.split_once(' ')?;
+        Some(Self { kind: kind.to_owned(), name: name.to_owned() })
+    }
 }
 
 impl CallLog {
@@ -54,8 +70,8 @@ impl CallLog {
         let mut log = Self::default();
         for line in text.lines() {
             // A name may have several spaces.
-            if let Some(name) = line.strip_prefix("name ") {
-                log.names.insert(name.to_owned());
+            if let Some(object) = line.strip_prefix("name ") {
+                log.names.extend(NamedObject::parse(object));
                 continue;
             }
             if let Some(name) = line.strip_prefix("device ") {
@@ -118,8 +134,8 @@ pub(crate) fn fails_line(command: &str) -> String {
 }
 
 /// Returns the line for the name of an object.
-pub(crate) fn name_line(name: &str) -> String {
-    format!("name {name}")
+pub(crate) fn name_line(object: &NamedObject) -> String {
+    format!("name {} {}", object.kind, object.name)
 }
 
 /// Returns the line for the name of a physical device.
@@ -181,6 +197,7 @@ pub(crate) mod tests {
     fn lines_come_back_and_the_last_live_objects_count() {
         let errors = [FaultError::HostMemory, FaultError::DeviceLost];
         let left = Leftovers { file_descriptors: 9, threads: 2, heap_bytes: 1234 };
+        let map = NamedObject { kind: "IMAGE".to_owned(), name: "height map,  rough".to_owned() };
         let text = [
             call_line("vkQueueSubmit2", &errors),
             live_line(&BTreeMap::from([("VkInstance", 1)])),
@@ -190,7 +207,7 @@ pub(crate) mod tests {
             told_line("vkWaitSemaphores"),
             fails_line("vkWaitSemaphores"),
             fails_line("vkWaitSemaphores"),
-            name_line("height map,  rough"),
+            name_line(&map),
             device_line("NVIDIA  H200"),
             live_line(&BTreeMap::from([("VkInstance", 0), ("VkBuffer", 2)])),
             orphans_line(&BTreeMap::from([("VkFence", 1)])),
@@ -205,7 +222,7 @@ pub(crate) mod tests {
         let expected = CallLog {
             calls,
             unready: BTreeSet::from(["vkEndCommandBuffer".to_owned()]),
-            names: BTreeSet::from(["height map,  rough".to_owned()]),
+            names: BTreeSet::from([map.clone()]),
             devices: BTreeSet::from(["NVIDIA  H200".to_owned()]),
             reached: true,
             failed: ["vkCreateBuffer", "vkWaitSemaphores"].map(str::to_owned).into(),

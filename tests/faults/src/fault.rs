@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use ash::vk;
+
 /// Errors that a call can be made to answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaultError {
@@ -41,6 +43,19 @@ impl FaultError {
             Self::SurfaceLost => "surface-lost",
             Self::OutOfDate => "out-of-date",
             Self::NoAddress => "no-address",
+        }
+    }
+
+    /// Returns what a call that this error makes fail answers.
+    #[must_use]
+    pub const fn result(self) -> vk::Result {
+        match self {
+            Self::HostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+            Self::DeviceMemory => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            Self::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
+            Self::SurfaceLost => vk::Result::ERROR_SURFACE_LOST_KHR,
+            Self::OutOfDate => vk::Result::ERROR_OUT_OF_DATE_KHR,
+            Self::NoAddress => vk::Result::SUCCESS,
         }
     }
 

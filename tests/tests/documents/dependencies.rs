@@ -244,6 +244,17 @@ fn duplicates_are_accepted_ones() {
     assert!(complaints.is_empty(), "see `skip` in .ci/deny.toml:\n{}", complaints.join("\n"));
 }
 
+/// Their crates take a fifth of the first build, and a member of the workspace can turn them on for all others.
+#[test]
+fn tests_alone_turn_on_the_windows_of_samples() {
+    let has_windows = |arguments: &[&str]| {
+        let dependents = tree(&[arguments, &["-i", "winit"]].concat()).unwrap();
+        dependents.lines().filter_map(Package::parse).any(|package| package.name == "lvk-samples")
+    };
+    assert!(has_windows(&[]), "tests have windows");
+    assert!(!has_windows(&["-e", "no-dev"]), "`cargo run` would build windows");
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,21 +9,26 @@ use super::Workload;
 use super::row::{Limit, OverheadRow};
 use super::scene::{Push, Scene};
 use crate::error::BenchError;
-use crate::hand_written::{RawCommands, RawDevice};
+use crate::hand_written::{RawCommands, RawDevice, RawFrameRing};
 use crate::measure::{FrameParts, elapsed_ms, interleave, median_of};
 
 pub(super) fn measure(ctx: &Context, workload: Workload) -> Result<Vec<OverheadRow>, BenchError> {
     let scene = Scene::new(ctx)?;
-    let raw = RawCommands::new(&RawDevice::new(ctx))?;
+    let device = RawDevice::new(ctx);
+    let (raw, ring) = (RawCommands::new(&device)?, RawFrameRing::new(&device)?);
     let frames = (workload.many / 20).max(1);
-    let samples: [Vec<FrameParts>; 2] = interleave(workload.runs, |which| {
+    let samples: [Vec<FrameParts>; 3] = interleave(workload.runs, |which| {
         let mut parts = Vec::new();
         for _ in 0..frames {
-            parts.push(if which == 0 { ours(ctx, &scene)? } else { by_hand(ctx, &raw, &scene)? });
+            parts.push(match which {
+                0 => ours(ctx, &scene)?,
+                1 => raw.frame(dispatch(ctx, &scene)?)?,
+                _ => ring.frame(dispatch(ctx, &scene)?)?,
+            });
         }
         Ok(median_of_each(&parts))
     })?;
-    let [ours, by_hand] = samples.map(|samples| median_of_each(&samples));
+    let [ours, by_hand, same_calls] = samples.map(|samples| median_of_each(&samples));
     let row = |name, ours, by_hand| {
         OverheadRow::new(name, 1e3 * ours, "us", Limit::None).compared_with(1e3 * by_hand)
     };
@@ -31,6 +36,7 @@ pub(super) fn measure(ctx: &Context, workload: Workload) -> Result<Vec<OverheadR
         row("frame of one dispatch: command buffer", ours.begin, by_hand.begin),
         row("- the same: commands", ours.record, by_hand.record),
         row("- the same: submission", ours.submit, by_hand.submit),
+        row("- the same, by hand with the library's calls", ours.submit, same_calls.submit),
     ])
 }
 
@@ -58,11 +64,12 @@ fn ours(ctx: &Context, scene: &Scene) -> lvk::Result<FrameParts> {
     Ok(FrameParts { begin, record: recorded - begin, submit: submitted - recorded })
 }
 
-fn by_hand(ctx: &Context, raw: &RawCommands, scene: &Scene) -> Result<FrameParts, BenchError> {
+/// Returns the commands of a frame by hand.
+fn dispatch(ctx: &Context, scene: &Scene) -> lvk::Result<impl FnOnce(vk::CommandBuffer)> {
     let pipeline = ctx.raw_compute_pipeline(*scene.compute)?;
     let (device, layout, set) = (ctx.raw_device(), ctx.raw_pipeline_layout(), [ctx.raw_descriptor_set()]);
     let push: Push = [scene.image.index(); 16];
-    raw.frame(|commands| {
+    Ok(move |commands| {
         // SAFETY: everything named is alive, and the command buffer is being recorded. The last frame was waited for.
         unsafe {
             let compute = vk::PipelineBindPoint::COMPUTE;

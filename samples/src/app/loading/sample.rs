@@ -77,8 +77,11 @@ impl<S: Sample> Loading<S> {
 }
 
 impl<S: Sample> UnderWay<S> {
-    /// Takes the result of the thread, once it has ended.
-    fn take(&mut self) -> Option<Made<S>> {
+    /// Takes the result of the thread, once it has ended and a frame was shown.
+    fn take_after_a_frame(&mut self) -> Option<Made<S>> {
+        if self.frames == 0 {
+            return None;
+        }
         let ReadySample { mut sample, summary } = match self.thread.take()? {
             Ok(opened) => opened,
             Err(error) => return Some(Err(error)),
@@ -101,7 +104,8 @@ impl<S: Sample> Sample for Loading<S> {
 
     fn is_loading(&mut self) -> Result<bool, RunError> {
         let State::UnderWay(under_way) = &mut self.state else { return Ok(false) };
-        let Some(made) = under_way.take() else { return Ok(true) };
+        // One frame comes first even where the thread is faster.
+        let Some(made) = under_way.take_after_a_frame() else { return Ok(true) };
         let ReadySample { sample, summary } = made?;
         print_line(&summary);
         self.state = State::Ready(sample);

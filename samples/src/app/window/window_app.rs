@@ -378,7 +378,7 @@ impl<S: Sample> Running<S> {
     fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
         if self.sample.is_loading()? {
             self.is_new = true;
-            return self.redraw_loading(name);
+            return self.redraw_loading(name, args);
         }
         if std::mem::take(&mut self.is_new) {
             // Frames that are counted are those of the animation.
@@ -426,10 +426,11 @@ impl<S: Sample> Running<S> {
     }
 
     /// Draws a frame without an image now and then, so that the loading thread is not delayed. Draws none while the GPU works
-    /// for the load, so that the window is not delayed either.
-    fn redraw_loading(&mut self, name: &str) -> Result<Next, RunError> {
+    /// for the load, so that the window is not delayed either. Where frames are counted it draws one, so that a run repeats to the call.
+    fn redraw_loading(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
         self.follow_size();
-        if !self.ctx.is_done(self.latest)? {
+        let is_enough = args.frames.is_some() && self.frames_here > 0;
+        if is_enough || !self.ctx.is_done(self.latest)? {
             return Ok(Next::Nap);
         }
         self.ctx.next_frame()?;

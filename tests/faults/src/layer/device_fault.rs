@@ -53,7 +53,7 @@ unsafe extern "system" fn extensions(
         return vk::Result::ERROR_UNKNOWN;
     };
     if let Some(fault) = injector().called(number, physical.as_raw()) {
-        return fault;
+        return fault.result();
     }
     let Some(below) = next(number, physical.as_raw()) else { return vk::Result::ERROR_UNKNOWN };
     // SAFETY: the address is that of the command in the next layer, and the arguments are the caller's or have the
@@ -204,7 +204,7 @@ unsafe extern "system" fn fault_info(
 ) -> vk::Result {
     let Some(number) = number_of("vkGetDeviceFaultInfoEXT") else { return vk::Result::ERROR_UNKNOWN };
     if let Some(fault) = injector().called(number, device.as_raw()) {
-        return fault;
+        return fault.result();
     }
     let is_lost = table_of(device.as_raw()).is_some_and(|table| table.lost.load(Ordering::Relaxed));
     let Some(report) = REPORT.filter(|_| is_lost) else { return vk::Result::ERROR_UNKNOWN };

@@ -15,7 +15,7 @@ use lvk::readable_bytes;
 use super::command_buffers::CommandBuffers;
 use super::commands::{Creates, DATED, LOST, MAPS, SURFACE};
 use super::dispatch::{COMMANDS, table_of};
-use crate::call_log;
+use crate::call_log::{self, NamedObject};
 use crate::fault::{Fault, FaultError};
 
 /// Environment variable with the path of the log.
@@ -79,7 +79,7 @@ impl Injector {
     }
 
     /// Counts a call of a wrapped command on a handle. Returns the error if the call is to fail.
-    pub(super) fn called(&self, number: usize, handle: u64) -> Option<vk::Result> {
+    pub(super) fn called(&self, number: usize, handle: u64) -> Option<FaultError> {
         let command = &COMMANDS[number];
         let table = table_of(handle);
         let submission = table.as_ref().filter(|_| command.gives_work());
@@ -94,23 +94,22 @@ impl Injector {
         if error == Some(FaultError::DeviceLost) && !is_lost {
             table.inspect(|table| table.lose());
         }
-        error.map(result_of)
+        error
     }
 
     /// True for a presentation to a surface that is lost or has changed, as Vulkan still executes its waits for semaphores, and for a
     /// mapping without an address, which its owner ends.
-    pub(super) fn still_executes(&self, number: usize, fault: vk::Result) -> bool {
-        let is_of_surface =
-            matches!(fault, vk::Result::ERROR_SURFACE_LOST_KHR | vk::Result::ERROR_OUT_OF_DATE_KHR);
-        fault == vk::Result::SUCCESS || COMMANDS[number].name == "vkQueuePresentKHR" && is_of_surface
+    pub(super) fn still_executes(&self, number: usize, fault: FaultError) -> bool {
+        let is_of_surface = matches!(fault, FaultError::SurfaceLost | FaultError::OutOfDate);
+        fault == FaultError::NoAddress || COMMANDS[number].name == "vkQueuePresentKHR" && is_of_surface
     }
 
     /// Gives a mapping that is to have no address the one of a failed `mmap`.
     ///
     /// # Safety
-    /// `words` are the arguments of the call, which has returned. The last points to an address if `fault` is a success.
-    pub(super) unsafe fn maps(&self, words: &[u64], fault: vk::Result) {
-        if fault == vk::Result::SUCCESS {
+    /// `words` are the arguments of the call, which has returned. The last points to an address if `fault` is of one.
+    pub(super) unsafe fn maps(&self, words: &[u64], fault: FaultError) {
+        if fault == FaultError::NoAddress {
             // SAFETY: by contract.
             unsafe { (words[words.len() - 1] as usize as *mut usize).write(usize::MAX) };
         }
@@ -124,8 +123,8 @@ impl Injector {
     }
 
     /// Counts a call of a command that may give `answers`. Returns the error if the call is to fail.
-    pub(super) fn called_by_name(&self, name: &'static str, answers: u8) -> Option<vk::Result> {
-        self.error_of_call(name, answers, false).map(result_of)
+    pub(super) fn called_by_name(&self, name: &'static str, answers: u8) -> Option<FaultError> {
+        self.error_of_call(name, answers, false)
     }
 
     /// Counts and logs a call. Returns its error: that of the fault, or the loss where the device is lost.
@@ -180,13 +179,13 @@ impl Injector {
         if COMMANDS[number].name != "vkSetDebugUtilsObjectNameEXT" {
             return;
         }
-        // SAFETY: the second argument of the command points to a structure with the name.
-        let name = unsafe {
+        // SAFETY: the second argument of the command points to a structure with kind and name.
+        let (kind, name) = unsafe {
             let info = words[1] as usize as *const vk::DebugUtilsObjectNameInfoEXT<'_>;
-            (*info).object_name_as_c_str()
+            (format!("{:?}", (*info).object_type), (*info).object_name_as_c_str())
         };
         if let Some(name) = name {
-            self.log_name(name, call_log::name_line);
+            self.log_name(&call_log::name_line(&NamedObject { kind, name: readable(name) }));
         }
     }
 
@@ -228,17 +227,16 @@ impl Injector {
                 let mut properties = vk::PhysicalDeviceProperties::default();
                 properties_of(devices.add(index).read(), &mut properties);
                 if let Ok(name) = properties.device_name_as_c_str() {
-                    self.log_name(name, call_log::device_line);
+                    self.log_name(&call_log::device_line(&readable(name)));
                 }
             }
         }
     }
 
     /// Logs a name the first time, by the line that `line` makes.
-    fn log_name(&self, name: &CStr, line: fn(&str) -> String) {
-        let line = line(&readable_bytes(name.to_bytes()));
-        if self.counts().names.insert(line.clone()) {
-            self.write(&line);
+    fn log_name(&self, line: &str) {
+        if self.counts().names.insert(line.to_owned()) {
+            self.write(line);
         }
     }
 
@@ -312,6 +310,11 @@ impl Injector {
 }
 
 /// Returns the errors that a command with these bits may answer.
+/// Returns a name as errors show it.
+fn readable(name: &CStr) -> String {
+    readable_bytes(name.to_bytes())
+}
+
 fn errors_of(answers: u8) -> Vec<FaultError> {
     let mut errors = vec![FaultError::HostMemory, FaultError::DeviceMemory];
     for (bit, error) in [
@@ -325,17 +328,6 @@ fn errors_of(answers: u8) -> Vec<FaultError> {
         }
     }
     errors
-}
-
-fn result_of(error: FaultError) -> vk::Result {
-    match error {
-        FaultError::HostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
-        FaultError::DeviceMemory => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
-        FaultError::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
-        FaultError::SurfaceLost => vk::Result::ERROR_SURFACE_LOST_KHR,
-        FaultError::OutOfDate => vk::Result::ERROR_OUT_OF_DATE_KHR,
-        FaultError::NoAddress => vk::Result::SUCCESS,
-    }
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ pub unsafe extern "system" fn negotiate(negotiation: *mut Negotiation) -> vk::Re
 #[unsafe(export_name = "lvk_fault_instance_version")]
 pub unsafe extern "system" fn instance_version(chain: *const VersionChain, version: *mut u32) -> vk::Result {
     match injector().called_by_name("vkEnumerateInstanceVersion", 0) {
-        Some(fault) => fault,
+        Some(fault) => fault.result(),
         // SAFETY: by contract.
         None => unsafe { ((*chain).next)((*chain).link, version) },
     }
@@ -58,7 +58,7 @@ pub unsafe extern "system" fn instance_extensions(
     properties: *mut vk::ExtensionProperties,
 ) -> vk::Result {
     match injector().called_by_name("vkEnumerateInstanceExtensionProperties", 0) {
-        Some(fault) => fault,
+        Some(fault) => fault.result(),
         // SAFETY: by contract.
         None => unsafe { ((*chain).next)((*chain).link, layer, count, properties) },
     }
@@ -75,7 +75,7 @@ pub unsafe extern "system" fn instance_layers(
     properties: *mut vk::LayerProperties,
 ) -> vk::Result {
     match injector().called_by_name("vkEnumerateInstanceLayerProperties", 0) {
-        Some(fault) => fault,
+        Some(fault) => fault.result(),
         // SAFETY: by contract.
         None => unsafe { ((*chain).next)((*chain).link, count, properties) },
     }
@@ -100,7 +100,7 @@ unsafe extern "system" fn create_instance(
     instance: *mut vk::Instance,
 ) -> vk::Result {
     if let Some(fault) = injector().called_by_name("vkCreateInstance", 0) {
-        return fault;
+        return fault.result();
     }
     // SAFETY: the loader passes a description with its link, and a valid pointer for the handle.
     unsafe {
@@ -147,7 +147,7 @@ unsafe extern "system" fn create_device(
     device: *mut vk::Device,
 ) -> vk::Result {
     if let Some(fault) = injector().called_by_name("vkCreateDevice", LOST) {
-        return fault;
+        return fault.result();
     }
     // SAFETY: the loader passes a description with its link, and a valid pointer for the handle.
     unsafe {

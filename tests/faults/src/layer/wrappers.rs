@@ -34,7 +34,7 @@ macro_rules! wrapper {
                 let fault = injector().called(N, words[0]);
                 injector().uses(N, &words, fault.is_some());
                 if let Some(fault) = fault.filter(|fault| !injector().still_executes(N, *fault)) {
-                    return fault;
+                    return fault.result();
                 }
                 let Some(next) = next(N, words[0]) else {
                     return vk::Result::ERROR_EXTENSION_NOT_PRESENT;
@@ -46,9 +46,9 @@ macro_rules! wrapper {
                 // SAFETY: the arguments are those of the caller.
                 let result = unsafe { next($($argument),+) };
                 if let Some(fault) = fault {
-                    // SAFETY: these are the arguments of the call; only a command that maps memory succeeds by a fault.
+                    // SAFETY: these are the arguments of the call; only one that maps memory may have no address.
                     unsafe { injector().maps(&words, fault) };
-                    return fault;
+                    return fault.result();
                 }
                 injector().returned(N, words[0]);
                 if result.as_raw() >= 0 {

@@ -22,7 +22,7 @@ pub(super) fn judge_error(
     if fault.error == FaultError::SurfaceLost
         && let Some((before, _)) = error.split_once(WINDOW_IS_GONE)
     {
-        return (!objects.end(before)).then(|| Flaw::UnnamedObject(error.to_owned()));
+        return (!objects.end_with_swapchain(before)).then(|| Flaw::UnnamedObject(error.to_owned()));
     }
     if fault.error == FaultError::OutOfDate
         && fault.span != Span::Once
@@ -49,7 +49,7 @@ pub(super) fn judge_error(
 /// Judges the error of a program that gives up a swapchain which stays out of date: `before` ends with its name, and it was made
 /// anew for each frame.
 fn judge_no_image(error: &str, objects: &KnownObjects<'_>, before: &str, found: &RunOutcome) -> Option<Flaw> {
-    if !objects.end(before) {
+    if !objects.end_with_swapchain(before) {
         return Some(Flaw::UnnamedObject(error.to_owned()));
     }
     let is_remade = found.failed.iter().all(|command| remakes_swapchain(command, &found.calls));
@@ -106,8 +106,16 @@ pub(super) fn commands_of(text: &str) -> impl Iterator<Item = (&str, &str)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::verdict::tests::{clean, refused};
+    use super::super::verdict::tests::{clean, named, refused};
     use super::*;
+
+    const NAMED: [(&str, &str); 5] = [
+        ("BUFFER", "rain"),
+        ("IMAGE", "rain"),
+        ("SWAPCHAIN_KHR", "main"),
+        ("SHADER_MODULE", "a"),
+        ("PIPELINE", "rays"),
+    ];
 
     /// Judges a line of a fault at `command`, where calls of `failed` were made to fail.
     fn judged(command: &str, error: FaultError, span: Span, failed: &[&str], text: &str) -> Option<Flaw> {
@@ -116,7 +124,7 @@ mod tests {
             text,
             &Fault { command: command.into(), call: 1, error, span },
             &RunOutcome { failed, ..refused() },
-            &RunOutcome { names: ["rain", "main", "a", "rays"].map(str::to_owned).into(), ..clean() },
+            &RunOutcome { names: named(&NAMED), ..clean() },
         )
     }
 
@@ -218,17 +226,17 @@ mod tests {
                 text,
                 &Fault { command: "vkAcquireNextImageKHR".into(), call: 1, error, span },
                 &found,
-                &clean(),
+                &RunOutcome { names: named(&NAMED), ..clean() },
             )
         };
         let remade =
             "vkCreateSwapchainKHR vkAcquireNextImageKHR! vkCreateSwapchainKHR vkAcquireNextImageKHR!";
         let stuck = "vkCreateSwapchainKHR vkAcquireNextImageKHR! vkAcquireNextImageKHR!";
-        let stale = "error: the swapchain 'rain' stays out of date: 20 frames have no image";
+        let stale = "error: the swapchain 'main' stays out of date: 20 frames have no image";
         let (dated, stays) = (FaultError::OutOfDate, Span::Stays);
         assert_eq!(judge(dated, stays, stale, remade), None);
         assert_eq!(judge(dated, stays, stale, stuck), Some(Flaw::NotRemade));
-        let other = stale.replace("rain", "snow");
+        let other = stale.replace("main", "rain");
         assert_eq!(judge(dated, stays, &other, remade), Some(Flaw::UnnamedObject(other.clone())));
         for (error, span) in [(dated, Span::Once), (FaultError::HostMemory, stays)] {
             assert_eq!(judge(error, span, stale, remade), Some(Flaw::UnnamedCommand(stale.to_owned())));

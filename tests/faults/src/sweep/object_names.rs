@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use lvk::Format;
 
 use super::verdict::RunOutcome;
+use crate::call_log::NamedObject;
 
 /// Objects that the library or a scenario gives no name in Vulkan, with the starts of the commands whose errors tell them.
 pub const UNNAMED_OBJECTS: &[(&str, &[&str])] = &[
@@ -40,6 +41,54 @@ const MEMORY: &[&str] = &["vkCreateBuffer", "vkAllocateMemory", "vkBindBufferMem
 /// Starts of the commands whose errors name a physical device.
 const PHYSICAL_DEVICE: &[&str] = &["vkEnumerateDevice", "vkGetPhysicalDevice", "vkCreateDevice"];
 
+/// Kinds of named objects that the error of a command may name, by starts of commands. Where several starts fit, the kinds of all do.
+const KINDS: &[(&[&str], &[&str])] = &[
+    (&["vkCreateBuffer", "vkBindBufferMemory"], MEMORY_OF_BUFFERS),
+    (&["vkAllocateMemory", "vkMapMemory", "vkGetMemory"], MEMORY_OF_BUFFERS),
+    (&["vkAllocateMemory", "vkMapMemory", "vkGetMemory"], &["IMAGE"]),
+    (&["vkCreateImage", "vkBindImageMemory", "vkGetImage", "vkTransitionImage"], &["IMAGE"]),
+    (&["vkCopyMemoryToImage", "vkCopyImageTo"], &["IMAGE"]),
+    // Asked for by whatever has a format: textures, pipelines with targets, samplers of YCbCr.
+    (&["vkGetPhysicalDeviceImageFormatProperties"], &["IMAGE", "PIPELINE", "SAMPLER"]),
+    (&["vkCreateImageView"], &["IMAGE_VIEW", "SWAPCHAIN_KHR"]),
+    (&["vkCreateSampler"], &["SAMPLER"]),
+    (&["vkCreateSamplerYcbcrConversion"], &["IMAGE", "SAMPLER_YCBCR_CONVERSION"]),
+    (&["vkCreateShaderModule"], &["SHADER_MODULE"]),
+    (
+        &["vkCreateGraphicsPipelines", "vkCreateComputePipelines", "vkCreateRayTracingPipelines"],
+        &["PIPELINE"],
+    ),
+    (
+        &["vkCreateDeferredOperation", "vkDeferredOperation", "vkGetRayTracingShaderGroupHandles"],
+        &["PIPELINE"],
+    ),
+    (&["vkCreatePipelineCache", "vkGetPipelineCacheData", "vkMergePipelineCaches"], &["PIPELINE_CACHE"]),
+    (&["vkCreateDescriptorSetLayout"], &["DESCRIPTOR_SET_LAYOUT"]),
+    (&["vkCreateDescriptorPool", "vkResetDescriptorPool"], &["DESCRIPTOR_POOL"]),
+    (&["vkAllocateDescriptorSets", "vkFreeDescriptorSets"], &["DESCRIPTOR_SET"]),
+    (&["vkCreateSemaphore", "vkWaitSemaphores", "vkGetSemaphore", "vkSignalSemaphore"], &["SEMAPHORE"]),
+    (&["vkImportSemaphore", "vkCreateFence", "vkImportFence"], &["SEMAPHORE", "FENCE"]),
+    (&["vkWaitForFences", "vkResetFences", "vkGetFence"], &["FENCE", "SWAPCHAIN_KHR"]),
+    (&["vkCreateQueryPool", "vkGetQueryPoolResults"], &["QUERY_POOL"]),
+    (&["vkCreateSwapchain", "vkGetSwapchain", "vkReleaseSwapchainImages"], &["SWAPCHAIN_KHR"]),
+    (&["vkAcquireNextImage", "vkQueuePresent", "vkWaitForPresent"], &["SWAPCHAIN_KHR"]),
+    (&["vkGetPhysicalDeviceSurface"], &["SWAPCHAIN_KHR"]),
+    (&["vkCreateAccelerationStructure", "vkBuildAccelerationStructures"], &["ACCELERATION_STRUCTURE_KHR"]),
+    (
+        &["vkCopyAccelerationStructure", "vkCopyMemoryToAccelerationStructure"],
+        &["ACCELERATION_STRUCTURE_KHR"],
+    ),
+    (&["vkWriteAccelerationStructures"], &["ACCELERATION_STRUCTURE_KHR"]),
+    (
+        &["vkCreateMicromap", "vkBuildMicromaps", "vkCopyMicromap", "vkCopyMemoryToMicromap"],
+        &["MICROMAP_EXT"],
+    ),
+];
+
+/// Kinds of objects whose memory is that of a buffer.
+const MEMORY_OF_BUFFERS: &[&str] = &["BUFFER", "ACCELERATION_STRUCTURE_KHR", "MICROMAP_EXT"];
+const SWAPCHAIN: &str = "SWAPCHAIN_KHR";
+
 /// Start of the names that the library makes of the name of another object.
 const READ_BACK: &str = "readback of ";
 
@@ -48,7 +97,7 @@ const FORMAT_QUERY: &str = "vkGetPhysicalDeviceImageFormatProperties";
 
 /// The objects that errors of one run may name.
 pub(super) struct KnownObjects<'a> {
-    names: BTreeSet<&'a str>,
+    named: BTreeSet<&'a NamedObject>,
     devices: BTreeSet<&'a str>,
     files: BTreeSet<&'a str>,
 }
@@ -57,11 +106,11 @@ impl<'a> KnownObjects<'a> {
     /// Collects the names of objects and physical devices, and the files of caches.
     pub(super) fn of(found: &'a RunOutcome, clean: &'a RunOutcome) -> Self {
         let both = [found, clean];
-        let names = both.iter().flat_map(|outcome| &outcome.names);
+        let named = both.iter().flat_map(|outcome| &outcome.names);
         let devices = both.iter().flat_map(|outcome| &outcome.devices);
         let files = both.iter().flat_map(|outcome| &outcome.files);
         Self {
-            names: names.map(String::as_str).filter(|name| !name.is_empty()).collect(),
+            named: named.filter(|object| !object.name.is_empty()).collect(),
             devices: devices.map(String::as_str).collect(),
             files: files.map(String::as_str).filter(|file| file.starts_with("caches/")).collect(),
         }
@@ -74,25 +123,39 @@ impl<'a> KnownObjects<'a> {
         rest.strip_prefix(" for '").is_some_and(|quoted| self.start(command, quoted))
     }
 
-    /// True if a text ends with a quote and the name of an object.
-    pub(super) fn end(&self, text: &str) -> bool {
-        self.names.iter().any(|name| text.strip_suffix(name).is_some_and(|before| before.ends_with('\'')))
+    /// True if a text ends with a quote and the name of a swapchain.
+    pub(super) fn end_with_swapchain(&self, text: &str) -> bool {
+        let ends = |name| text.strip_suffix(name).is_some_and(|before| before.ends_with('\''));
+        self.of_kinds(&[SWAPCHAIN]).any(ends)
+    }
+
+    /// Returns the names of objects of these kinds.
+    fn of_kinds(&self, kinds: &[&str]) -> impl Iterator<Item = &str> {
+        self.named.iter().filter(|object| kinds.contains(&&*object.kind)).map(|object| &*object.name)
     }
 
     /// True if a text quotes the name of an object.
     pub(super) fn occur(&self, text: &str) -> bool {
         text.match_indices('\'')
-            .any(|(place, _)| self.names.iter().any(|name| starts_with(&text[place + 1..], name)))
+            .any(|(place, _)| self.named.iter().any(|object| starts_with(&text[place + 1..], &object.name)))
     }
 
     /// True if a text starts with the name of an object of `command` and the closing quote.
     fn start(&self, command: &str, quoted: &str) -> bool {
         let concerns = |starts: &[&str]| starts.iter().any(|start| command.starts_with(start));
+        let kinds: Vec<_> = KINDS
+            .iter()
+            .filter(|(starts, _)| concerns(starts))
+            .flat_map(|(_, kinds)| *kinds)
+            .copied()
+            .collect();
+        let is_named = self.of_kinds(&kinds).any(|name| starts_with(quoted, name));
         let source = quoted.strip_prefix(READ_BACK).filter(|_| concerns(MEMORY));
-        let is_named =
-            |name: &&str| starts_with(quoted, name) || source.is_some_and(|source| starts_with(source, name));
+        let is_readback = source
+            .is_some_and(|source| self.of_kinds(&["BUFFER", "IMAGE"]).any(|name| starts_with(source, name)));
         let is_unnamed = |(name, starts): &(&str, &[&str])| concerns(starts) && starts_with(quoted, name);
-        self.names.iter().any(is_named)
+        is_named
+            || is_readback
             || concerns(PHYSICAL_DEVICE) && self.devices.iter().any(|name| starts_with(quoted, name))
             || UNNAMED_OBJECTS.iter().any(is_unnamed)
             || command.starts_with(FORMAT_QUERY)
@@ -114,12 +177,17 @@ fn starts_with(text: &str, name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::verdict::tests::clean;
+    use super::super::verdict::tests::{clean, named};
     use super::*;
 
     #[test]
     fn only_objects_of_the_program_count() {
-        let names = ["rain", "the sky's colour", ""].map(str::to_owned).into();
+        let names = named(&[
+            ("BUFFER", "rain"),
+            ("IMAGE", "the sky's colour"),
+            ("SWAPCHAIN_KHR", "main"),
+            ("IMAGE", ""),
+        ]);
         let devices = ["llvmpipe".to_owned()].into();
         let (found, without) = (clean(), RunOutcome { names, devices, ..clean() });
         let objects = KnownObjects::of(&found, &without);
@@ -127,6 +195,9 @@ mod tests {
             ("vkCreateBuffer", " for 'rain'"),
             ("vkCreateBuffer", " failed for 'rain': ERROR_UNKNOWN"),
             ("vkCreateImage", " for 'the sky's colour'; create it later"),
+            ("vkAllocateMemory", " for 'the sky's colour'"),
+            ("vkCreateImageView", " for 'the sky's colour'"),
+            ("vkCreateImageView", " for 'main'"),
             ("vkMapMemory", " for 'readback of rain'"),
             ("vkQueueSubmit2", " for 'compute queue'; create a new context"),
             ("vkCreateDevice", " for 'llvmpipe'"),
@@ -143,6 +214,10 @@ mod tests {
             ("vkCreateBuffer", " for 'rain and snow'"),
             ("vkCreateBuffer", " for 'llvmpipe'"),
             ("vkCreateBuffer", " for 'compute queue'"),
+            ("vkCreateBuffer", " for 'the sky's colour'"),
+            ("vkCreateImage", " for 'rain'"),
+            ("vkCreateImage", " for 'main'"),
+            ("vkQueueSubmit2", " for 'rain'"),
             ("vkCreateImage", " for 'Rgba8Unorm'"),
             ("vkCreateImage", " for 'readback of rain'"),
             ("vkMapMemory", " for 'readback of snow'"),
@@ -151,9 +226,9 @@ mod tests {
         ] {
             assert!(!objects.follow(command, rest), "{command}{rest}");
         }
-        assert!(
-            objects.end("swapchain 'rain") && !objects.end("swapchain 'snow") && !objects.end("swapchain '")
-        );
+        for (text, ends) in [("swapchain 'main", true), ("swapchain 'rain", false), ("swapchain '", false)] {
+            assert_eq!(objects.end_with_swapchain(text), ends, "{text}");
+        }
         assert!(objects.occur("shader 'rain' needs") && !objects.occur("shader 'snow' needs"));
     }
 }

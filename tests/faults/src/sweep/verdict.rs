@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use crate::call_log::Call;
+use crate::call_log::{Call, NamedObject};
 use crate::fault::{Fault, Span};
 use crate::leftovers::Leftovers;
 
@@ -49,8 +49,8 @@ pub struct RunOutcome {
     pub dead: BTreeSet<String>,
     /// Commands that used a command buffer which an earlier call had not begun or reset, because it had failed.
     pub unready: BTreeSet<String>,
-    /// Names of objects. A run without a fault has those that it gives to a tool, too.
-    pub names: BTreeSet<String>,
+    /// Objects that have names. A run without a fault has those that it names for a tool, too.
+    pub names: BTreeSet<NamedObject>,
     /// Names of physical devices.
     pub devices: BTreeSet<String>,
     /// What the process held at its end.
@@ -287,6 +287,13 @@ pub(super) mod tests {
     use crate::call_log::tests::calls;
     use crate::fault::FaultError;
 
+    /// Objects of a kind and a name each.
+    pub(in crate::sweep) fn named(objects: &[(&str, &str)]) -> BTreeSet<NamedObject> {
+        let object =
+            |&(kind, name): &(&str, &str)| NamedObject { kind: kind.to_owned(), name: name.to_owned() };
+        objects.iter().map(object).collect()
+    }
+
     pub(in crate::sweep) fn clean() -> RunOutcome {
         RunOutcome {
             ending: Ending::Status(0),
@@ -294,7 +301,7 @@ pub(super) mod tests {
             reached: false,
             calls: Vec::new(),
             unready: BTreeSet::new(),
-            names: BTreeSet::from(["rain".to_owned()]),
+            names: named(&[("BUFFER", "rain"), ("SEMAPHORE", "graphics timeline")]),
             devices: BTreeSet::from(["llvmpipe".to_owned()]),
             failed: BTreeSet::new(),
             told_others: BTreeSet::new(),
@@ -337,7 +344,7 @@ pub(super) mod tests {
     fn the_right_result_and_a_polite_refusal_pass() {
         let other_shader = RunOutcome { files: BTreeSet::from(["caches/3.spirv".to_owned()]), ..clean() };
         let told_others = BTreeSet::from(["vkWaitSemaphores".to_owned()]);
-        let stderr = "error: the device was lost in vkWaitSemaphores for 'rain'".to_owned();
+        let stderr = "error: the device was lost in vkWaitSemaphores for 'graphics timeline'".to_owned();
         let by_other_thread = RunOutcome { told_others, stderr, ..refused() };
         for outcome in [clean(), refused(), other_shader] {
             assert_eq!(found(&outcome), []);
@@ -374,16 +381,18 @@ pub(super) mod tests {
             [Flaw::NoCounts],
             "an error does not say that there was no instance"
         );
-        let without_instance = |command: &str, calls_made: &str| RunOutcome {
+        let without_instance = |command: &str, object: &str, calls_made: &str| RunOutcome {
             calls: calls(calls_made),
             failed: BTreeSet::from([command.to_owned()]),
-            stderr: format!("error: out of host memory in {command} for 'rain'"),
+            stderr: format!("error: out of host memory in {command} for '{object}'"),
             ..refused()
         };
-        for command in ["vkCreateInstance", "vkEnumerateInstanceVersion"] {
+        for (command, object) in
+            [("vkCreateInstance", "instance"), ("vkEnumerateInstanceVersion", "Vulkan loader")]
+        {
             let fault = Fault { command: command.into(), ..fault(Span::Once) };
             let judged = |made: &str| {
-                let outcome = RunOutcome { counts_objects: false, ..without_instance(command, made) };
+                let outcome = RunOutcome { counts_objects: false, ..without_instance(command, object, made) };
                 flaws(Some(&fault), &outcome, &clean())
             };
             assert_eq!(judged(&format!("{command}!")), [], "{command}");
