@@ -109,6 +109,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "triplanar/frame",
     "triplanar/triplanar",
     "viewer/albedo",
+    "viewer/ambient_occlusion",
     "viewer/bsdf",
     "viewer/candidate",
     "viewer/emitters",
@@ -134,6 +135,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/trace_pipeline",
     "viewer/trace_query",
     "viewer/visible_light",
+    "viewer/visible_surface",
     "viewer/visible_triangle",
     "yuv/push",
 ];

@@ -149,10 +149,19 @@ const PROGRAMS: &[Program] = &[
     },
 ];
 
+/// The sample that has tests of its own (`cli`), for those of all samples.
+const HYBRID: Program = Program {
+    path: env!("CARGO_BIN_EXE_hybrid"),
+    quick: &["--samples", "1"],
+    own: &[],
+    said: &[],
+    ways: RAYS,
+};
+
 /// The one program that cannot do without something that devices lack.
 const MESH_SHADERS: &str = env!("CARGO_BIN_EXE_mesh_shaders");
 
-const SHARED: [&str; 14] = [
+const SHARED: [&str; 15] = [
     "--frames",
     "--round",
     "--resume",
@@ -163,6 +172,7 @@ const SHARED: [&str; 14] = [
     "--profile",
     "--list-devices",
     "--validate",
+    "--check-indices",
     "--no-cache",
     "Examples:",
     "Exit status: 0",
@@ -286,6 +296,20 @@ fn every_method_writes_an_image_under_validation() {
             assert_names(&outcome.out, program.said);
             let [picture] = &files(folder.path())[..] else { panic!("one picture") };
             assert_eq!(image::open(picture).unwrap().into_rgba8().dimensions(), SIZE.into());
+        }
+    }
+}
+
+#[test]
+#[ignore = "minutes: .ci/slow indices"]
+fn every_method_uses_live_and_declared_objects() {
+    for program in possible().chain([&HYBRID]) {
+        for way in program.ways {
+            let folder = tempfile::tempdir().unwrap();
+            let args = [&["--frames", "1", "--check-indices"], *way].concat();
+            let outcome = Outcome::from_command(program.small(folder.path(), "a.png", &args));
+            outcome.assert_success();
+            assert_names(&outcome.out, &["index faults: 0"]);
         }
     }
 }

@@ -262,6 +262,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     float emitterPower; // sum of areas of emitters times their weights
     uint cacheBuckets; // of the radiance cache; 0 without one
     float cellShare; // side of its cells over their distance from the eye
+    float ambient; // radiance that surfaces return which no ray looks at
+    float occlusionDistance; // of surfaces that take none of it
 };
 
 layout(push_constant, scalar) uniform PushConstants {

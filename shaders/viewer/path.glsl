@@ -1,5 +1,5 @@
 // Paths of light from the camera. At each surface a shadow ray looks for light, and the path goes on in a direction that the surface
-// prefers; light that both can find is shared between them. The including file provides traceNearest() and transmittanceTo().
+// prefers; light that both can find is shared between them. The including file provides traceWithin() and transmittanceTo().
 #ifndef VIEWER_PATH
 #define VIEWER_PATH
 
@@ -8,6 +8,11 @@
 
 // Surfaces of a path before chance may end it.
 const uint kSureBounces = 3u;
+// Least density per solid angle of a direction in which a scattered ray finds lights that are near; the including file may define
+// another. Shadow rays have all of their light that comes from others.
+#ifndef LEAST_DENSITY
+#define LEAST_DENSITY 0.0
+#endif
 // Angle of the cone that a scattered ray stands for, over the root of the solid angle of one that is as likely.
 const float kConeShare = 0.25;
 
@@ -34,13 +39,19 @@ struct ShadowRay {
     vec3 matte; // of it what the matte layer scatters
 };
 
+// True for light from outside of the scene, which any scattered ray finds if there is a sky.
+bool isBeyond(Arriving arriving) {
+    return arriving.distance >= kFar && frame.skyProbability > 0.0;
+}
+
 // A ray to one light or to the sky, drawn by chance. `extinction`: of the volume that the path came through. The ray does not begin on
 // the surface but a little above it, so it is aimed anew: along the direction from the surface, it would meet a light that stands low
 // over the surface before its range ends.
 ShadowRay shadowRay(Surface surface, Bsdf bsdf, vec3 extinction, float choice, vec2 u) {
     Arriving arriving = drawLight(surface.position, choice, u);
     Response response = respond(surface, bsdf, arriving.direction);
-    float share = arriving.density > 0.0 ? powerShare(arriving.density, response.density) : 1.0;
+    bool isFoundTwice = arriving.density > 0.0 && (response.density >= LEAST_DENSITY || isBeyond(arriving));
+    float share = isFoundTwice ? powerShare(arriving.density, response.density) : 1.0;
     vec3 light = share * arriving.radiance;
     ShadowRay ray = ShadowRay(leaveTo(surface, arriving.direction), arriving.direction, kFar, vec3(0.0), vec3(0.0));
     if (arriving.distance < kFar) {
@@ -71,10 +82,10 @@ void storePath(uint place, Path path, Random random) {
     frame.paths.at[place].pair = random.pair;
 }
 
-// The next surface on the way of a path.
-Hit nextHit(inout Path path, Random random) {
+// The next surface on the way of a path, up to `range` away; at that distance where there is none.
+Hit nextHit(inout Path path, float range, Random random) {
     path.rayCount += 1u;
-    return traceNearest(path.origin, path.direction, hashWords(random.seed + path.bounce, random.number));
+    return traceWithin(path.origin, path.direction, range, hashWords(random.seed + path.bounce, random.number));
 }
 
 // The surface at a hit. The path loses what the volume before it takes.

@@ -12,7 +12,7 @@ Path beginPath(uvec2 pixel, inout Random random) {
 
 // Leads a path from its origin to the next surface, and on from there. False: it ends.
 bool advance(inout Path path, uint place, inout Random random) {
-    Hit hit = nextHit(path, random);
+    Hit hit = nextHit(path, kFar, random);
     if (hit.instance == kNothing) {
         path.radiance += lightBeyond(path);
         return false;

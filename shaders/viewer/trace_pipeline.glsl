@@ -1,4 +1,4 @@
-// traceNearest() and transmittanceTo() by the ray tracing pipeline.
+// traceWithin() and transmittanceTo() by the ray tracing pipeline.
 #ifndef VIEWER_TRACE_PIPELINE
 #define VIEWER_TRACE_PIPELINE
 
@@ -6,9 +6,11 @@
 
 layout(location = 0) rayPayloadEXT Payload payload;
 
-Hit traceNearest(vec3 origin, vec3 direction, uint seed) {
+// The nearest surface up to `range` away, at the distance `range` where there is none.
+Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed) {
     payload.seed = seed == kShadow ? 0u : seed;
-    traceRayEXT(kTLAS[frame.tlas], LVK_RAY_FLAG_NONE, 0xffu, 0, 0, 0, origin, 0.0, direction, 1e30, 0);
+    payload.hit.distance = range;
+    traceRayEXT(kTLAS[frame.tlas], LVK_RAY_FLAG_NONE, 0xffu, 0, 0, 0, origin, 0.0, direction, range, 0);
     return payload.hit;
 }
 

@@ -1,4 +1,4 @@
-// traceNearest() and transmittanceTo() by ray queries. What is not opaque is judged as the any-hit shader does.
+// traceWithin() and transmittanceTo() by ray queries. What is not opaque is judged as the any-hit shader does.
 #ifndef VIEWER_TRACE_QUERY
 #define VIEWER_TRACE_QUERY
 
@@ -23,13 +23,14 @@ void judgeCandidate(LvkRayQueryParameter query) {
     }
 }
 
-Hit traceNearest(vec3 origin, vec3 direction, uint seed) {
+// The nearest surface up to `range` away, at the distance `range` where there is none.
+Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed) {
     payload.seed = seed == kShadow ? 0u : seed;
     LvkRayQuery query;
-    lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_NONE, 0xffu, origin, 0.0, direction, 1e30);
+    lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_NONE, 0xffu, origin, 0.0, direction, range);
     while (lvkRayQueryProceed(query)) {
     }
-    Hit hit = Hit(kNothing, 0u, 0u, vec2(0.0), 0.0);
+    Hit hit = Hit(kNothing, 0u, 0u, vec2(0.0), range);
     if (lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE) {
         hit.instance = uint(lvkRayQueryInstanceCustomIndex(query, LVK_COMMITTED));
         hit.geometry = uint(lvkRayQueryGeometryIndex(query, LVK_COMMITTED));

@@ -51,6 +51,10 @@ pub struct BenchArgs {
     #[arg(value_parser = clap::value_parser!(OsString), global = true)]
     pub(super) list_scenes: Option<OsString>,
 
+    /// One Vulkan queue for all commands, where the library would use others for computing and transfers
+    #[arg(long, global = true)]
+    pub(super) single_queue: bool,
+
     /// Run with Vulkan validation; a message is an error, and times are not meaningful
     #[arg(long, global = true)]
     pub(super) validate: bool,

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use lvk::{
-    Context, ContextDesc, DeviceProfile, RayQueryRequest, RayTracingPipelineRequest, ValidationMode,
-    ValidationSink,
+    Context, ContextDesc, DeviceProfile, QueueRequest, RayQueryRequest, RayTracingPipelineRequest,
+    ValidationMode, ValidationSink,
 };
 
 use crate::args::{BenchArgs, Benchmark, ImageSizeArgs};
@@ -20,6 +20,7 @@ pub(super) struct Setup {
     profile: DeviceProfile,
     /// Implementation of ray queries: the driver's, unless the software implementation is measured.
     ray_query: RayQueryRequest,
+    queues: QueueRequest,
     runs: Option<u32>,
     quick: bool,
     /// Receives validation messages; `None` without validation.
@@ -42,6 +43,7 @@ impl Setup {
             device: args.device.clone(),
             profile: args.profile.clone().unwrap_or_default(),
             ray_query: ray_query_request(args.benchmark.as_ref()),
+            queues: if args.single_queue { QueueRequest::Shared } else { QueueRequest::default() },
             runs: args.runs,
             quick: args.quick,
             sink: args.validate.then(ValidationSink::default),
@@ -103,6 +105,7 @@ impl Setup {
             device: self.device.as_deref(),
             ray_query: self.ray_query,
             ray_tracing_pipeline: self.pipeline(),
+            queues: self.queues,
             validation: if self.sink.is_some() { ValidationMode::Standard } else { ValidationMode::Off },
             validation_sink: self.sink.clone(),
             profile: Some(profile).filter(|profile| **profile != DeviceProfile::default()),

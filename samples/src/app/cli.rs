@@ -300,6 +300,9 @@ fn attempt<S: Sample>(
         render_frames(&mut Headless::new(&mut sample), &request, &mut Progress::visible(), interrupt);
     let remark = sample.remark();
     drop(sample);
+    if args.check_indices {
+        device::report_index_faults(&context)?;
+    }
     context.wait_idle()?;
     drop(context);
     if args.validate.is_some() {

@@ -9,10 +9,10 @@ use lvk::{
 };
 
 use super::caches::Caches;
-use super::print_line;
 use super::ray_args::RayTracing;
 use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
+use super::{print_line, print_message};
 use lvk_dev_driver::{self as driver, Driver, DriverError, DriverRequest};
 
 /// Requirements of a sample on the device.
@@ -62,6 +62,7 @@ pub(super) fn open(
             window: window.clone(),
             validation: validation(args.validate),
             validation_sink: args.validate.map(|_| sink.clone()),
+            check_indices: args.check_indices,
             ray_tracing_pipeline,
             ray_query,
             required_features: needs.features,
@@ -234,6 +235,14 @@ pub(super) fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
     let count = sink.messages().len();
     print_line(&format!("validation messages: {count}"));
     if count == 0 { Ok(()) } else { Err(RunError::Validation(count)) }
+}
+
+/// Fails when shaders have used wrong indices of bindless arrays, or textures that commands do not declare. Each is printed.
+pub(in crate::app) fn report_index_faults(context: &Context) -> Result<(), RunError> {
+    let faults = context.index_faults()?;
+    faults.iter().for_each(|fault| print_message("error", fault));
+    print_line(&format!("index faults: {}", faults.len()));
+    if faults.is_empty() { Ok(()) } else { Err(RunError::IndexFaults(faults.len())) }
 }
 
 fn validation(wish: Option<ValidationArg>) -> lvk::ValidationMode {

@@ -87,6 +87,10 @@ pub struct RunArgs {
     #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "core")]
     #[arg(help_heading = "Device")]
     pub validate: Option<ValidationArg>,
+
+    /// Check what shaders take from bindless arrays: wrong indices, and textures that commands do not declare, are errors. Slow
+    #[arg(long, help_heading = "Device")]
+    pub check_indices: bool,
 }
 
 impl RunArgs {

@@ -101,6 +101,9 @@ pub enum RunError {
     /// The validation layer was not silent.
     #[error("validation reported {}", crate::app::counted(*.0, "message"))]
     Validation(usize),
+    /// Shaders have used wrong indices of bindless arrays, or textures that commands do not declare.
+    #[error("shaders have {} of bindless arrays", crate::app::counted(*.0, "index fault"))]
+    IndexFaults(usize),
     /// Ctrl-C, or the request of a batch system.
     #[error("interrupted after {done} of {count} frames; every picture written is whole{hint}")]
     Interrupted {
@@ -142,7 +145,7 @@ impl RunError {
             Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
             Self::NoScreenshot { .. } | Self::WindowLost(_) => 1,
-            Self::Driver(_) | Self::Validation(_) => 1,
+            Self::Driver(_) | Self::Validation(_) | Self::IndexFaults(_) => 1,
         }
     }
 }

@@ -59,6 +59,8 @@ pub enum IndirectLight {
     /// Paths alone, each with all of its surfaces.
     #[default]
     Paths,
+    /// A constant, less of it near other surfaces. Three rays for most pixels, and more in mirrors and glass.
+    AmbientOcclusion,
 }
 
 /// How the hybrid method finds the surfaces that pixels show.
@@ -166,6 +168,11 @@ impl ViewerConfig {
     /// True if frames have a radiance cache.
     pub(crate) fn caches(&self) -> bool {
         self.method == Method::Hybrid && self.indirect == IndirectLight::Cache
+    }
+
+    /// True if frames have ambient occlusion.
+    pub(crate) fn occludes_ambient(&self) -> bool {
+        self.method == Method::Hybrid && self.indirect == IndirectLight::AmbientOcclusion
     }
 
     /// True if frames are rasterised.

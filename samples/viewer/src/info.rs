@@ -128,6 +128,7 @@ mod tests {
         assert_eq!(args.indirect, IndirectLight::default());
         assert_eq!(args.cache_entries, ViewerConfig::DEFAULT_CACHE_ENTRIES);
         assert_eq!(parsed("--indirect cache").unwrap().indirect, IndirectLight::Cache);
+        assert_eq!(parsed("--indirect ambient-occlusion").unwrap().indirect, IndirectLight::AmbientOcclusion);
         assert_eq!(parsed("--primary raster").unwrap().primary, PrimaryVisibility::Raster);
         assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
         assert!(!args.real_time && parsed("--real-time --frames 0..9").unwrap().real_time);

@@ -112,6 +112,7 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
             ui.label("indirect light");
             ui.selectable_value(&mut config.indirect, IndirectLight::Cache, "cache");
             ui.selectable_value(&mut config.indirect, IndirectLight::Paths, "paths");
+            ui.selectable_value(&mut config.indirect, IndirectLight::AmbientOcclusion, "ambient occlusion");
         });
     }
     if config.rasterises() {

@@ -21,6 +21,8 @@ const GPU_STEPS: &[u32] = &[1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 4, 4];
 const CPU_STEPS: &[u32] = &[2, 2, 4, 4];
 /// The same with a radiance cache, where most paths end at their second surface.
 const GPU_CACHE_STEPS: &[u32] = &[1, 1, 1, 2, 4];
+/// The same with ambient occlusion, where paths have four surfaces at most.
+const GPU_OCCLUSION_STEPS: &[u32] = &[1, 1];
 /// Bytes of a path between launches.
 const PATH_BYTES: u64 = size_of::<GpuStoredPath>() as u64;
 /// Bytes before the lists of paths (`kListHead` in `shaders/viewer/path_launch.glsl`).
@@ -75,6 +77,7 @@ impl PathPass {
         let paths = buffer(ctx, "paths", size_bytes)?;
         let steps = match ctx.capabilities().is_cpu {
             true => CPU_STEPS,
+            false if config.occludes_ambient() => GPU_OCCLUSION_STEPS,
             false if config.caches() => GPU_CACHE_STEPS,
             false => GPU_STEPS,
         };
@@ -193,6 +196,7 @@ mod tests {
         }
         assert_eq!(steps_of_launches(CPU_STEPS, u32::MAX - 1), [2, 2, 4, 4, 0]);
         assert_eq!(steps_of_launches(GPU_STEPS, 3), [1, 1, 0]);
+        assert_eq!(steps_of_launches(GPU_OCCLUSION_STEPS, 32), [1, 1, 0]);
     }
 
     #[test]

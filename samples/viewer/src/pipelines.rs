@@ -26,6 +26,12 @@ pub(crate) const LIGHT: PathStages = PathStages {
     query: stage!("visible_light.comp"),
     debug_name: "viewer light",
 };
+/// Light with ambient occlusion, of the real-time method.
+pub(crate) const AMBIENT_OCCLUSION: PathStages = PathStages {
+    rays: stage!("ambient_occlusion.rgen"),
+    query: stage!("ambient_occlusion.comp"),
+    debug_name: "viewer ambient occlusion",
+};
 pub(crate) const NEAREST_MISS: SampleStage = stage!("nearest.rmiss");
 pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
 pub(crate) const CANDIDATE: SampleStage = stage!("candidate.rahit");
@@ -58,6 +64,11 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
         ),
         SamplePipeline::new("viewer: light by pipeline", &[LIGHT.rays, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
         SamplePipeline::new("viewer: light by query", &[LIGHT.query]),
+        SamplePipeline::new(
+            "viewer: ambient occlusion by pipeline",
+            &[AMBIENT_OCCLUSION.rays, NEAREST_MISS, NEAREST_HIT, CANDIDATE],
+        ),
+        SamplePipeline::new("viewer: ambient occlusion by query", &[AMBIENT_OCCLUSION.query]),
         SamplePipeline::new("viewer: radiance cache", &[RADIANCE_CACHE]),
         SamplePipeline::new("viewer: means over time", &[TEMPORAL]),
         SamplePipeline::new("viewer: filter", &[FILTER]),

@@ -25,6 +25,8 @@ use crate::renderer::Renderer;
 /// Samples of a pass of the path tracer, so that none takes long: on a GPU, and on a CPU.
 const GPU_PASS: u32 = 4;
 const CPU_PASS: u32 = 16;
+/// Distance up to which surfaces take ambient light from each other, over the diagonal of the scene.
+const OCCLUSION_SHARE: f32 = 0.05;
 /// Distance of the near plane over the distance of what the camera looks at.
 const NEAR_SHARE: f32 = 1e-3;
 
@@ -260,7 +262,7 @@ impl Viewer {
         let needs_others = config.method != before.method
             || config.path != before.path
             || config.rasterises() != before.rasterises()
-            || config.caches() != before.caches()
+            || config.indirect != before.indirect
             || config.cache_entries != before.cache_entries
             || counts_steps(config) != counts_steps(before);
         let occludes = config.occludes(self.counts().1);
@@ -375,6 +377,9 @@ impl Viewer {
             emission: self.scene.emission(),
             cache_buckets: addresses.cache.bucket_count,
             cell_share: cell_share(seen.pixel_spread()),
+            ambient: self.scene.ambient(),
+            occlusion_distance: OCCLUSION_SHARE
+                * self.bounds.min.distance(self.bounds.max).max(f32::MIN_POSITIVE),
         })
     }
 

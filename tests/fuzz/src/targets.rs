@@ -24,7 +24,7 @@ pub const TARGETS: &[Target] = &[
     target("cameras", bound(512 * KIB, 24, 2 * MIB), read_cameras),
     Target {
         name: "image",
-        memory: MemoryBound { fixed: 128 * KIB, per_byte: 16, per_decoded: 2, most: 24 * MIB },
+        memory: MemoryBound { fixed: 512 * KIB, per_byte: 16, per_decoded: 2, most: 24 * MIB },
         decoded: decoded_image_bytes,
         read: read_image,
     },

@@ -1,6 +1,7 @@
 //! The viewer: its path tracer against values that are known, against an independent path tracer, and against itself by other ray
 //! tracing paths; files that it loads.
 
+mod ambient_occlusion;
 mod animation;
 mod city;
 mod cycles;

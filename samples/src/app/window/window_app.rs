@@ -23,6 +23,7 @@ use super::resize::ResizeDebounce;
 use super::touch::Finger;
 use super::ui_input::{UiInput, notches};
 use crate::app::cli::{ReadySample, SampleSetup};
+use crate::app::device::report_index_faults;
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
 use crate::app::run_args::RunArgs;
@@ -54,7 +55,7 @@ where
         WindowApp { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
     event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
     let WindowApp { running, ended, .. } = program;
-    let closed = running.map_or(Ok(()), Running::close);
+    let closed = running.map_or(Ok(()), |running| running.close(args.check_indices));
     ended?;
     closed
 }
@@ -368,10 +369,13 @@ impl<S: Sample> Running<S> {
         }
     }
 
-    /// Ends what is loading, and waits for the GPU.
-    fn close(self) -> Result<(), RunError> {
+    /// Ends what is loading, and waits for the GPU. `checks_indices`: index faults are an error.
+    fn close(self, checks_indices: bool) -> Result<(), RunError> {
         let Self { sample, ctx, .. } = self;
         drop(sample);
+        if checks_indices {
+            report_index_faults(&ctx)?;
+        }
         Ok(ctx.wait_idle()?)
     }
 

@@ -321,6 +321,8 @@ lvk::shader_struct! {
         pub(crate) emission: EmissionConstants,
         pub(crate) cache_buckets: u32,
         pub(crate) cell_share: f32,
+        pub(crate) ambient: f32,
+        pub(crate) occlusion_distance: f32,
     }
 
     /// `PushConstants`.

@@ -1,5 +1,7 @@
 //! Lights of a model and of its environment as shaders read them.
 
+use std::f64::consts::PI;
+
 use glam::{DVec3, Mat4, Vec3};
 use lvk_gltf::{Bounds, LightKind, Model, Pose};
 
@@ -13,8 +15,12 @@ pub(crate) struct GpuLights {
     pub(crate) disc_count: u32,
     pub(crate) sky_probability: f32,
     pub(crate) emission: EmissionConstants,
+    /// Radiance that surfaces return, in the mean.
+    pub(crate) ambient: f32,
 }
 
+/// The reflectance of surfaces, in the mean, of which nothing is known.
+const MEAN_REFLECTANCE: f64 = 0.5;
 /// The share of samples that a source of light gets at least, over its even share.
 const LEAST_SHARE: f64 = 0.25;
 
@@ -32,7 +38,7 @@ pub(crate) struct LightSetting {
 impl LightSetting {
     /// A model with directional lights of its own needs no sun.
     pub(crate) fn new(model: &Model, environment: &Environment, disc_radius: f32, bounds: Bounds) -> Self {
-        let sky = luminance(environment.sky.mean()) * std::f64::consts::PI;
+        let sky = luminance(environment.sky.mean()) * PI;
         let has_sun = model.lights.iter().any(|light| light.kind == LightKind::Directional);
         Self { sun: environment.sun.filter(|_| !has_sun), sky, disc_radius, bounds }
     }
@@ -65,8 +71,24 @@ impl GpuLights {
             emitter_probability,
             emitter_power: emitters.power as f32,
         };
-        Self { lights, disc_count, sky_probability, emission }
+        let ambient = ambient(&lights, [emitters.power, setting.sky], &setting.bounds) as f32;
+        Self { lights, disc_count, sky_probability, emission, ambient }
     }
+}
+
+/// The radiance that surfaces return, in the mean. Light of lamps and of emitters, which have that radiant intensity, goes from surface to
+/// surface in the box around the scene (the ambient term of Cohen et al., "A Progressive Refinement Approach to Fast Radiosity Image
+/// Generation", 1988). Light from outside, where the sky gives that irradiance, comes to surfaces of all directions and is scattered once.
+fn ambient(lights: &[GpuLight], [emitters, sky]: [f64; 2], bounds: &Bounds) -> f64 {
+    let bright = |light: &GpuLight| luminance(Vec3::from(light.color).as_dvec3());
+    let (discs, lamps): (Vec<_>, Vec<_>) = lights.iter().partition(|light| light.kind == light_kind::DISC);
+    let flux = PI * emitters + lamps.into_iter().map(|lamp| 4.0 * PI * bright(lamp)).sum::<f64>();
+    let extent = (bounds.max - bounds.min).as_dvec3();
+    let area = 2.0 * extent.dot(DVec3::new(extent.y, extent.z, extent.x));
+    let within = if area > 0.0 { flux / area * MEAN_REFLECTANCE / (1.0 - MEAN_REFLECTANCE) } else { 0.0 };
+    // A quarter is the mean of the cosine over all directions, of which half have none.
+    let without = sky + 0.25 * discs.into_iter().map(bright).sum::<f64>();
+    (within + MEAN_REFLECTANCE * without) / PI
 }
 
 /// Sets the probabilities of lights by the light that they bring about the middle of the scene. Returns those of emitters, which
@@ -161,5 +183,26 @@ mod tests {
         assert_eq!(lights[2].probability, 0.0);
         let mut none = [];
         assert_eq!(choose(&mut none, [0.0; 2], &bounds), [0.0; 2]);
+    }
+
+    #[test]
+    fn ambient_light_is_that_of_a_closed_box_or_half_of_what_comes_from_outside() {
+        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        // Walls of 24 square metres get 12 watts, 0.5 each: they return that much, and its half, and so on.
+        let lamp =
+            GpuLight { kind: light_kind::POINT, color: [3.0 / PI as f32; 3], ..bytemuck::Zeroable::zeroed() };
+        let disc = GpuLight { kind: light_kind::DISC, color: [4.0; 3], ..bytemuck::Zeroable::zeroed() };
+        for (lights, other, radiosity) in [
+            (&[lamp][..], [0.0; 2], 0.5),
+            (&[], [12.0 / PI, 0.0], 0.5),
+            (&[], [0.0, 2.0], 1.0),
+            (&[disc], [0.0; 2], 0.5),
+            (&[], [0.0; 2], 0.0),
+        ] {
+            let found = ambient(lights, other, &bounds);
+            assert!((found - radiosity / PI).abs() < 1e-6, "{found}, not {radiosity} over pi");
+        }
+        let point = Bounds { min: Vec3::ONE, max: Vec3::ONE };
+        assert_eq!(ambient(&[lamp], [1.0, 0.0], &point), 0.0, "no box");
     }
 }

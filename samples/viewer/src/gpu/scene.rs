@@ -224,6 +224,11 @@ impl GpuScene {
         self.lights.emission
     }
 
+    /// Radiance that surfaces return, in the mean.
+    pub(crate) fn ambient(&self) -> f32 {
+        self.lights.ambient
+    }
+
     /// Buffers that vertices are moved in; draws and rays read them.
     pub(crate) fn written(&self) -> Vec<BufferHandle> {
         self.motion.as_ref().map_or_else(Vec::new, SceneMotion::written)

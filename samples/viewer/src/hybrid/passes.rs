@@ -5,11 +5,16 @@ use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependenc
 use crate::config::{Content, ViewerConfig};
 use crate::gpu::FrameScene;
 use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
-use crate::path_pass::{PathPass, compute, groups};
-use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, LIGHT, STEPS, TEMPORAL};
+use crate::path_pass::{PathPass, PathStages, compute, groups};
+use crate::pipelines::{AMBIENT_OCCLUSION, ANTIALIAS, COMPOSITE, FILTER, LIGHT, STEPS, TEMPORAL};
 
 /// Steps of the filter in space.
 const FILTER_STEPS: u32 = 4;
+
+/// The stages of the light of what pixels show.
+fn light_stages(config: &ViewerConfig) -> &'static PathStages {
+    if config.occludes_ambient() { &AMBIENT_OCCLUSION } else { &LIGHT }
+}
 
 /// The pipelines.
 pub(crate) struct Passes {
@@ -27,7 +32,7 @@ impl Passes {
         let is_of_steps = config.content == Content::Steps;
         let filter = |stage| compute(ctx, stage, FRAME_LAYOUT);
         Ok(Self {
-            light: PathPass::new(ctx, config, &LIGHT)?,
+            light: PathPass::new(ctx, config, light_stages(config))?,
             temporal: filter(TEMPORAL)?,
             filter: filter(FILTER)?,
             composite: filter(COMPOSITE)?,

@@ -309,12 +309,12 @@ impl Injector {
     }
 }
 
-/// Returns the errors that a command with these bits may answer.
 /// Returns a name as errors show it.
 fn readable(name: &CStr) -> String {
     readable_bytes(name.to_bytes())
 }
 
+/// Returns the errors that a command with these bits may answer.
 fn errors_of(answers: u8) -> Vec<FaultError> {
     let mut errors = vec![FaultError::HostMemory, FaultError::DeviceMemory];
     for (bit, error) in [

@@ -41,18 +41,17 @@ const MEMORY: &[&str] = &["vkCreateBuffer", "vkAllocateMemory", "vkBindBufferMem
 /// Starts of the commands whose errors name a physical device.
 const PHYSICAL_DEVICE: &[&str] = &["vkEnumerateDevice", "vkGetPhysicalDevice", "vkCreateDevice"];
 
-/// Kinds of named objects that the error of a command may name, by starts of commands. Where several starts fit, the kinds of all do.
+/// Kinds of named objects that errors may name, by starts of commands. The row with the longest start decides.
 const KINDS: &[(&[&str], &[&str])] = &[
-    (&["vkCreateBuffer", "vkBindBufferMemory"], MEMORY_OF_BUFFERS),
-    (&["vkAllocateMemory", "vkMapMemory", "vkGetMemory"], MEMORY_OF_BUFFERS),
-    (&["vkAllocateMemory", "vkMapMemory", "vkGetMemory"], &["IMAGE"]),
+    (&["vkCreateBuffer", "vkBindBufferMemory"], &["BUFFER", "ACCELERATION_STRUCTURE_KHR", "MICROMAP_EXT"]),
+    (&["vkAllocateMemory", "vkMapMemory", "vkGetMemory"], WITH_MEMORY),
     (&["vkCreateImage", "vkBindImageMemory", "vkGetImage", "vkTransitionImage"], &["IMAGE"]),
     (&["vkCopyMemoryToImage", "vkCopyImageTo"], &["IMAGE"]),
-    // Asked for by whatever has a format: textures, pipelines with targets, samplers of YCbCr.
-    (&["vkGetPhysicalDeviceImageFormatProperties"], &["IMAGE", "PIPELINE", "SAMPLER"]),
-    (&["vkCreateImageView"], &["IMAGE_VIEW", "SWAPCHAIN_KHR"]),
+    (&["vkCreateImageView"], &["IMAGE", "IMAGE_VIEW", "SWAPCHAIN_KHR"]),
+    // Whatever has a format asks for it: textures, pipelines with targets, samplers of YCbCr, swapchains.
+    (&["vkGetPhysicalDeviceImageFormatProperties"], &["IMAGE", "PIPELINE", "SAMPLER", "SWAPCHAIN_KHR"]),
     (&["vkCreateSampler"], &["SAMPLER"]),
-    (&["vkCreateSamplerYcbcrConversion"], &["IMAGE", "SAMPLER_YCBCR_CONVERSION"]),
+    (&["vkCreateSamplerYcbcrConversion"], &["SAMPLER", "SAMPLER_YCBCR_CONVERSION"]),
     (&["vkCreateShaderModule"], &["SHADER_MODULE"]),
     (
         &["vkCreateGraphicsPipelines", "vkCreateComputePipelines", "vkCreateRayTracingPipelines"],
@@ -67,12 +66,12 @@ const KINDS: &[(&[&str], &[&str])] = &[
     (&["vkCreateDescriptorPool", "vkResetDescriptorPool"], &["DESCRIPTOR_POOL"]),
     (&["vkAllocateDescriptorSets", "vkFreeDescriptorSets"], &["DESCRIPTOR_SET"]),
     (&["vkCreateSemaphore", "vkWaitSemaphores", "vkGetSemaphore", "vkSignalSemaphore"], &["SEMAPHORE"]),
-    (&["vkImportSemaphore", "vkCreateFence", "vkImportFence"], &["SEMAPHORE", "FENCE"]),
-    (&["vkWaitForFences", "vkResetFences", "vkGetFence"], &["FENCE", "SWAPCHAIN_KHR"]),
+    (&["vkImportSemaphore"], &["SEMAPHORE"]),
+    (&["vkCreateFence", "vkImportFence", "vkWaitForFences", "vkResetFences", "vkGetFence"], &["FENCE", "SWAPCHAIN_KHR"]),
     (&["vkCreateQueryPool", "vkGetQueryPoolResults"], &["QUERY_POOL"]),
     (&["vkCreateSwapchain", "vkGetSwapchain", "vkReleaseSwapchainImages"], &["SWAPCHAIN_KHR"]),
     (&["vkAcquireNextImage", "vkQueuePresent", "vkWaitForPresent"], &["SWAPCHAIN_KHR"]),
-    (&["vkGetPhysicalDeviceSurface"], &["SWAPCHAIN_KHR"]),
+    (&["vkGetPhysicalDeviceSurface", "vkCreateX"], &["SWAPCHAIN_KHR"]),
     (&["vkCreateAccelerationStructure", "vkBuildAccelerationStructures"], &["ACCELERATION_STRUCTURE_KHR"]),
     (
         &["vkCopyAccelerationStructure", "vkCopyMemoryToAccelerationStructure"],
@@ -85,9 +84,19 @@ const KINDS: &[(&[&str], &[&str])] = &[
     ),
 ];
 
-/// Kinds of objects whose memory is that of a buffer.
-const MEMORY_OF_BUFFERS: &[&str] = &["BUFFER", "ACCELERATION_STRUCTURE_KHR", "MICROMAP_EXT"];
+/// Kinds of objects that have memory.
+const WITH_MEMORY: &[&str] = &["BUFFER", "ACCELERATION_STRUCTURE_KHR", "MICROMAP_EXT", "IMAGE"];
+/// Kinds of objects that are read back.
+const READABLE: &[&str] = &["BUFFER", "IMAGE", "IMAGE_VIEW"];
 const SWAPCHAIN: &str = "SWAPCHAIN_KHR";
+
+/// Returns the kinds of named objects that an error of a command may name.
+fn kinds_of(command: &str) -> &'static [&'static str] {
+    let starts =
+        |row: &'static (&[&str], &[&str])| row.0.iter().map(move |start| (start.len(), row.1, *start));
+    let fitting = KINDS.iter().flat_map(starts).filter(|(_, _, start)| command.starts_with(start));
+    fitting.max_by_key(|(length, ..)| *length).map_or(&[], |(_, kinds, _)| kinds)
+}
 
 /// Start of the names that the library makes of the name of another object.
 const READ_BACK: &str = "readback of ";
@@ -143,16 +152,10 @@ impl<'a> KnownObjects<'a> {
     /// True if a text starts with the name of an object of `command` and the closing quote.
     fn start(&self, command: &str, quoted: &str) -> bool {
         let concerns = |starts: &[&str]| starts.iter().any(|start| command.starts_with(start));
-        let kinds: Vec<_> = KINDS
-            .iter()
-            .filter(|(starts, _)| concerns(starts))
-            .flat_map(|(_, kinds)| *kinds)
-            .copied()
-            .collect();
-        let is_named = self.of_kinds(&kinds).any(|name| starts_with(quoted, name));
+        let is_named = self.of_kinds(kinds_of(command)).any(|name| starts_with(quoted, name));
         let source = quoted.strip_prefix(READ_BACK).filter(|_| concerns(MEMORY));
-        let is_readback = source
-            .is_some_and(|source| self.of_kinds(&["BUFFER", "IMAGE"]).any(|name| starts_with(source, name)));
+        let is_readback =
+            source.is_some_and(|source| self.of_kinds(READABLE).any(|name| starts_with(source, name)));
         let is_unnamed = |(name, starts): &(&str, &[&str])| concerns(starts) && starts_with(quoted, name);
         is_named
             || is_readback

@@ -1,0 +1,96 @@
+// The surface that each pixel shows: how a ray or the rasteriser finds it, and what later passes are told of it.
+#ifndef VIEWER_VISIBLE_SURFACE
+#define VIEWER_VISIBLE_SURFACE
+
+#include "viewer/path.glsl"
+#include "viewer/plane.glsl"
+#include "viewer/visible_triangle.glsl"
+
+// Exposed light that a path brings in the first frame of a still at most. A brighter path would leave a bright spot for many frames.
+const float kBrightestPath = 12.0;
+
+// Width of the cone of a pixel by which textures are read, in pixels: antialiasing takes the mean of many places in a pixel, so that mip
+// levels may be one finer.
+const float kConeOfPixel = 0.5;
+
+// Where the ray of a pixel meets the plane of the triangle that the pixel shows.
+Hit visibleHit(uint place, vec3 direction) {
+    uvec4 visible = visibleTriangle(ivec2(place % frame.camera.width, place / frame.camera.width));
+    if (visible.x == kNothing) {
+        return Hit(kNothing, 0u, 0u, vec2(0.0), 0.0);
+    }
+    vec3 origin = frame.camera.eye;
+    Instance instance = frame.instances.at[visible.x];
+    Geometry geometry = frame.geometries.at[instance.firstGeometry + visible.y];
+    uvec3 corners = CornerArray(geometry.indices).at[visible.z];
+    vec3 a = toWorld(instance, positionOf(geometry, corners.x));
+    vec3 e1 = toWorld(instance, positionOf(geometry, corners.y)) - a;
+    vec3 e2 = toWorld(instance, positionOf(geometry, corners.z)) - a;
+    vec3 p = cross(direction, e2);
+    float determinant = dot(e1, p);
+    float inverse = abs(determinant) > 0.0 ? 1.0 / determinant : 0.0;
+    vec3 s = origin - a;
+    vec3 q = cross(s, e1);
+    vec2 barycentrics = clamp(vec2(dot(s, p), dot(direction, q)) * inverse, 0.0, 1.0);
+    barycentrics /= max(barycentrics.x + barycentrics.y, 1.0);
+    float distance = dot(a + barycentrics.x * e1 + barycentrics.y * e2 - origin, direction);
+    return Hit(visible.x, visible.y, visible.z, barycentrics, distance);
+}
+
+// Where the surface at `point` was in the frame before.
+vec3 pointBefore(Hit hit, vec3 point) {
+    Geometry geometry = frame.geometries.at[frame.instances.at[hit.instance].firstGeometry + hit.geometry];
+    uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
+    vec3 weights = weightsOf(hit.barycentrics);
+    vec3 now = vec3(0.0);
+    vec3 before = vec3(0.0);
+    for (uint corner = 0u; corner < 3u; ++corner) {
+        now += weights[corner] * positionIn(geometry.positions, geometry.flags, corners[corner]);
+        before += weights[corner] * positionIn(geometry.positionsBefore, geometry.flags, corners[corner]);
+    }
+    vec3 way = transformed(frame.rowsBefore.at[hit.instance], before) - transformed(frame.instances.at[hit.instance].rows, now);
+    return frame.sceneMoves != 0u ? point + way : point;
+}
+
+// Light that a path brings to the eye. The bound grows with the frames of a still, by the fourth root of their number: a spot fades
+// before it is seen, and the mean still comes to that of all paths.
+vec3 boundedLight(vec3 light) {
+    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount)));
+    float most = largest(light) * frame.exposure;
+    return most > bound ? light * (bound / most) : light;
+}
+
+// What later passes need of a pixel, beside its light.
+void storeSurface(uint place, Seen seen, vec3 base, vec3 matteAlbedo, vec3 share) {
+    frame.planes.at[currentPlane(kPlaneSurface, place)] = packedSeen(seen);
+    frame.planes.at[planePlace(kPlaneBase, place)] = vec4(base, 0.0);
+    frame.planes.at[planePlace(kPlaneMatteAlbedo, place)] = vec4(matteAlbedo, 0.0);
+    frame.planes.at[planePlace(kPlaneMirroredShare, place)] = vec4(share, 0.0);
+}
+
+void storePoint(uint place, vec3 point) {
+    frame.planes.at[planePlace(kPlaneBefore, place)] = vec4(point, 0.0);
+}
+
+// The same of a surface with its layers.
+void storeLayers(uint place, Seen seen, Surface surface, Bsdf bsdf) {
+    bool isClear = bsdf.lobes[kGlassLobe] + bsdf.lobes[kPaneLobe] > 0.0;
+    seen.roughness = surface.coat > 0.0 ? min(surface.roughness, surface.coatRoughness) : surface.roughness;
+    storeSurface(place, seen, surface.emission, bsdf.diffuse + bsdf.sheen, isClear ? vec3(1.0) : bsdf.reflected);
+}
+
+// The same of the sky.
+void storeSky(uint place, vec3 direction) {
+    storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
+    storeSurface(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), vec3(0.0), vec3(0.0));
+}
+
+// Light of the layers of a surface, for the filters without their colours.
+void storeLight(uint place, vec3 matte, vec3 mirrored) {
+    vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
+    vec3 share = frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(matte / max(matteAlbedo, 1e-3), 0.0);
+    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(mirrored / max(share, 1e-3), 0.0);
+}
+
+#endif
