@@ -67,7 +67,10 @@ const KINDS: &[(&[&str], &[&str])] = &[
     (&["vkAllocateDescriptorSets", "vkFreeDescriptorSets"], &["DESCRIPTOR_SET"]),
     (&["vkCreateSemaphore", "vkWaitSemaphores", "vkGetSemaphore", "vkSignalSemaphore"], &["SEMAPHORE"]),
     (&["vkImportSemaphore"], &["SEMAPHORE"]),
-    (&["vkCreateFence", "vkImportFence", "vkWaitForFences", "vkResetFences", "vkGetFence"], &["FENCE", "SWAPCHAIN_KHR"]),
+    (
+        &["vkCreateFence", "vkImportFence", "vkWaitForFences", "vkResetFences", "vkGetFence"],
+        &["FENCE", "SWAPCHAIN_KHR"],
+    ),
     (&["vkCreateQueryPool", "vkGetQueryPoolResults"], &["QUERY_POOL"]),
     (&["vkCreateSwapchain", "vkGetSwapchain", "vkReleaseSwapchainImages"], &["SWAPCHAIN_KHR"]),
     (&["vkAcquireNextImage", "vkQueuePresent", "vkWaitForPresent"], &["SWAPCHAIN_KHR"]),
