@@ -47,7 +47,6 @@ impl FaultError {
     }
 
     /// Returns what a call that this error makes fail answers.
-    #[must_use]
     pub const fn result(self) -> vk::Result {
         match self {
             Self::HostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,

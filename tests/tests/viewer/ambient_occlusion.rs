@@ -60,7 +60,7 @@ fn ground(material: Material) -> Builder {
 }
 
 #[test]
-fn what_nothing_hides_has_all_light_of_the_sky() {
+fn open_surfaces_have_all_light_of_the_sky() {
     let Some(ctx) = software_device() else { return };
     let parts = [
         ("matte ground", matte([0.8, 0.5, 0.3]), [0.8, 0.5, 0.3]),
