@@ -6,6 +6,17 @@
 #include "viewer/radiance_cache.glsl"
 #include "viewer/visible_surface.glsl"
 
+// Exposed light that a path brings in the first frame of a still at most. A brighter path would leave a bright spot for many frames.
+const float kBrightestPath = 12.0;
+
+// Light that a path brings to the eye. The bound grows with the frames of a still, by the fourth root of their number: a spot fades
+// before it is seen, and the mean still comes to that of all paths.
+vec3 boundedLight(vec3 light) {
+    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount)));
+    float most = largest(light) * frame.exposure;
+    return most > bound ? light * (bound / most) : light;
+}
+
 // What the surface of a pixel returns of its own shadow ray, and of the light of the path beyond. It waits for the end of the path in
 // planes that the filter writes later.
 struct FirstLight {
@@ -31,6 +42,10 @@ FirstLight storedFirst(uint place) {
                       frame.planes.at[planePlace(kPlaneMatteWeight, place)].rgb,
                       frame.planes.at[planePlace(kPlaneMirroredWeight, place)].rgb);
 }
+
+// Width of the cone of a pixel by which textures are read, in pixels: antialiasing takes the mean of many places in a pixel, so that mip
+// levels may be one finer.
+const float kConeOfPixel = 0.5;
 
 Path beginPath(uvec2 pixel, inout Random random) {
     Path path = cameraPath(cameraDirection(frame.camera, pixel));
@@ -183,7 +198,12 @@ void endPath(Path path, uint place) {
     }
     FirstLight first = storedFirst(place);
     vec3 beyond = radianceOf(path);
-    storeLight(place, first.matte + boundedLight(first.matteWeight * beyond), first.mirrored + boundedLight(first.mirroredWeight * beyond));
+    vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
+    vec3 share = frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
+    vec3 matte = first.matte + boundedLight(first.matteWeight * beyond);
+    vec3 mirrored = first.mirrored + boundedLight(first.mirroredWeight * beyond);
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(matte / max(matteAlbedo, 1e-3), 0.0);
+    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(mirrored / max(share, 1e-3), 0.0);
 }
 
 #include "viewer/path_launch.glsl"

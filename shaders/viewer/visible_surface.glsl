@@ -6,13 +6,6 @@
 #include "viewer/plane.glsl"
 #include "viewer/visible_triangle.glsl"
 
-// Exposed light that a path brings in the first frame of a still at most. A brighter path would leave a bright spot for many frames.
-const float kBrightestPath = 12.0;
-
-// Width of the cone of a pixel by which textures are read, in pixels: antialiasing takes the mean of many places in a pixel, so that mip
-// levels may be one finer.
-const float kConeOfPixel = 0.5;
-
 // Where the ray of a pixel meets the plane of the triangle that the pixel shows.
 Hit visibleHit(uint place, vec3 direction) {
     uvec4 visible = visibleTriangle(ivec2(place % frame.camera.width, place / frame.camera.width));
@@ -52,14 +45,6 @@ vec3 pointBefore(Hit hit, vec3 point) {
     return frame.sceneMoves != 0u ? point + way : point;
 }
 
-// Light that a path brings to the eye. The bound grows with the frames of a still, by the fourth root of their number: a spot fades
-// before it is seen, and the mean still comes to that of all paths.
-vec3 boundedLight(vec3 light) {
-    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount)));
-    float most = largest(light) * frame.exposure;
-    return most > bound ? light * (bound / most) : light;
-}
-
 // What later passes need of a pixel, beside its light.
 void storeSurface(uint place, Seen seen, vec3 base, vec3 matteAlbedo, vec3 share) {
     frame.planes.at[currentPlane(kPlaneSurface, place)] = packedSeen(seen);
@@ -83,14 +68,6 @@ void storeLayers(uint place, Seen seen, Surface surface, Bsdf bsdf) {
 void storeSky(uint place, vec3 direction) {
     storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
     storeSurface(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), vec3(0.0), vec3(0.0));
-}
-
-// Light of the layers of a surface, for the filters without their colours.
-void storeLight(uint place, vec3 matte, vec3 mirrored) {
-    vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
-    vec3 share = frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
-    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(matte / max(matteAlbedo, 1e-3), 0.0);
-    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(mirrored / max(share, 1e-3), 0.0);
 }
 
 #endif

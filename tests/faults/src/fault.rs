@@ -46,7 +46,7 @@ impl FaultError {
         }
     }
 
-    /// Returns what a call that this error makes fail answers.
+    /// Returns the answer of a call that this error makes fail.
     pub const fn result(self) -> vk::Result {
         match self {
             Self::HostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,

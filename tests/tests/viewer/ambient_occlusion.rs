@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 use lvk::Context;
-use lvk_gltf::{Light, LightKind, Material, Model};
+use lvk_gltf::{Material, Model};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::Sample as _;
 use lvk_samples::hybrid::RayPath;
@@ -16,6 +16,7 @@ use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::{IndirectLight, Method, Viewer, ViewerConfig};
 
 use crate::paths::assert_alike;
+use crate::radiance_cache::{dark, lamp, walls};
 use crate::scenes::{Builder, View, assert_close, colored, matte, mean, viewer};
 use crate::still_life::still_life;
 
@@ -111,17 +112,10 @@ fn the_sky_is_hidden_by_a_wall_and_near_parts_of_it_return_less() {
 #[test]
 fn a_closed_space_has_the_ambient_light_of_its_lamp() {
     let Some(ctx) = software_device() else { return };
-    let pale = matte([0.6; 3]);
     let (low, high) = (Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 2.5, 2.0));
-    let [x, y, z] = [Vec3::X * 4.0, Vec3::Y * 2.5, Vec3::Z * 4.0];
-    let sides = [(low, z, x), (low, x, y), (low, y, z), (high, -y, -x), (high, -z, -y), (high, -x, -z)];
-    let lamp = Light { name: None, color: [1.0; 3], intensity: 3.0, range: None, kind: LightKind::Point };
-    let model = sides
-        .into_iter()
-        .fold(Builder::default(), |builder, (corner, u, v)| builder.quad(corner, u, v, pale.clone()))
-        .lamp(lamp, Vec3::new(0.0, 2.2, 0.0))
-        .model();
-    let [light] = seen_at(&ctx, &model, &Environment::uniform([0.0; 3]), [Vec3::ZERO]);
+    let model =
+        walls(Builder::default(), low, high, [0.6; 3]).lamp(lamp(3.0), Vec3::new(0.0, 2.2, 0.0)).model();
+    let [light] = seen_at(&ctx, &model, &dark(), [Vec3::ZERO]);
     let (flux, area) = (4.0 * PI * 3.0, 2.0 * (4.0 * 2.5 + 2.5 * 4.0 + 4.0 * 4.0));
     let expected = 0.6 * (3.0 / (2.2 * 2.2) + flux / area) / PI;
     assert_close("the middle of the floor", light, [expected; 3], 0.02);

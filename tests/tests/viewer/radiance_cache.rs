@@ -30,16 +30,18 @@ const TABLES: [(&str, IndirectLight, u32); 4] = [
     ("paths alone", IndirectLight::Paths, 1),
 ];
 
-fn dark() -> Environment {
+/// No light from outside.
+pub fn dark() -> Environment {
     Environment::uniform([0.0; 3])
 }
 
-fn lamp(intensity: f32) -> Light {
+/// A white lamp that shines to all sides.
+pub fn lamp(intensity: f32) -> Light {
     Light { name: None, color: [1.0; 3], intensity, range: None, kind: LightKind::Point }
 }
 
 /// Walls around a space, seen from inside.
-fn walls(builder: Builder, low: Vec3, high: Vec3, color: [f32; 3]) -> Builder {
+pub fn walls(builder: Builder, low: Vec3, high: Vec3, color: [f32; 3]) -> Builder {
     let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| axis * (high - low).dot(axis));
     let sides = [(low, x, y), (low, y, z), (low, z, x), (high, -y, -x), (high, -z, -y), (high, -x, -z)];
     sides.into_iter().fold(builder, |builder, (corner, u, v)| builder.quad(corner, u, v, matte(color)))

@@ -1,35 +1,34 @@
 //! A command buffer that is recorded, submitted and waited for repeatedly, with timestamps.
 
-use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Instant;
 
 use lvk::ash::vk;
 
 use super::RawDevice;
+use super::command_pool::RawCommandPool;
+use super::timeline::RawTimeline;
 use crate::error::BenchError;
 use crate::measure::{FrameParts, SubmissionTimes, elapsed_ms};
 
 /// A command buffer that is recorded, submitted and waited for repeatedly.
 pub(crate) struct RawCommands {
-    pool: vk::CommandPool,
+    pool: RawCommandPool,
     commands: vk::CommandBuffer,
     fence: vk::Fence,
-    timeline: vk::Semaphore,
-    /// Last value of the timeline semaphore.
-    reached: Cell<u64>,
+    timeline: RawTimeline,
     queries: vk::QueryPool,
     device: Rc<RawDevice>,
 }
 
 impl RawCommands {
     pub(crate) fn new(device: &Rc<RawDevice>) -> Result<Self, BenchError> {
+        let pool = RawCommandPool::new(device)?;
         let mut made = Self {
-            pool: vk::CommandPool::null(),
-            commands: vk::CommandBuffer::null(),
+            commands: pool.allocate()?,
+            pool,
             fence: vk::Fence::null(),
-            timeline: vk::Semaphore::null(),
-            reached: Cell::new(0),
+            timeline: RawTimeline::new(device)?,
             queries: vk::QueryPool::null(),
             device: Rc::clone(device),
         };
@@ -39,26 +38,12 @@ impl RawCommands {
 
     fn create(&mut self) -> Result<(), BenchError> {
         let device = &self.device.device;
-        let pool = vk::CommandPoolCreateInfo::default()
-            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
-            .queue_family_index(self.device.ctx.raw_queue_family());
-        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
-        let timeline = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        let fence = vk::FenceCreateInfo::default();
         let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
-        // SAFETY: the descriptions are valid; the queue family is that of the device.
+        // SAFETY: the descriptions are valid.
         unsafe {
-            self.pool = device
-                .create_command_pool(&pool, None)
-                .map_err(BenchError::hand_written("vkCreateCommandPool"))?;
-            let info =
-                vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
-            let allocated = device.allocate_command_buffers(&info);
-            self.commands = allocated.map_err(BenchError::hand_written("vkAllocateCommandBuffers"))?[0];
-            let fence = vk::FenceCreateInfo::default();
             self.fence =
                 device.create_fence(&fence, None).map_err(BenchError::hand_written("vkCreateFence"))?;
-            let made = device.create_semaphore(&timeline, None);
-            self.timeline = made.map_err(BenchError::hand_written("vkCreateSemaphore"))?;
             let made = device.create_query_pool(&queries, None);
             self.queries = made.map_err(BenchError::hand_written("vkCreateQueryPool"))?;
         }
@@ -90,7 +75,7 @@ impl RawCommands {
     pub(crate) fn submit_empty_on_timeline(&self) -> Result<(), BenchError> {
         self.begin_bare()?;
         self.submit_on_timeline()?;
-        self.wait_for_timeline()
+        self.timeline.wait()
     }
 
     /// Submits the commands that `record` records and waits for a timeline semaphore. Returns the time before the wait, by its parts.
@@ -102,28 +87,13 @@ impl RawCommands {
         let recorded = elapsed_ms(start);
         self.submit_on_timeline()?;
         let submitted = elapsed_ms(start);
-        self.wait_for_timeline()?;
+        self.timeline.wait()?;
         Ok(FrameParts { begin, record: recorded - begin, submit: submitted - recorded })
     }
 
     /// Submits the command buffer with the next value of the timeline.
     fn submit_on_timeline(&self) -> Result<(), BenchError> {
-        let signal =
-            vk::SemaphoreSubmitInfo::default().semaphore(self.timeline).value(self.reached.get() + 1);
-        let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        self.submit_with(&signals, vk::Fence::null())
-    }
-
-    /// Waits for the submission of [`submit_on_timeline`](Self::submit_on_timeline).
-    fn wait_for_timeline(&self) -> Result<(), BenchError> {
-        let next = self.reached.get() + 1;
-        let (semaphores, values) = ([self.timeline], [next]);
-        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-        // SAFETY: the semaphore is a timeline, and its next value was submitted.
-        let waited = unsafe { self.device.device.wait_semaphores(&wait, u64::MAX) };
-        waited.map_err(BenchError::hand_written("vkWaitSemaphores"))?;
-        self.reached.set(next);
-        Ok(())
+        self.submit_with(&[self.timeline.signal()], vk::Fence::null())
     }
 
     fn begin(&self) -> Result<(), BenchError> {
@@ -135,17 +105,8 @@ impl RawCommands {
     }
 
     fn begin_bare(&self) -> Result<(), BenchError> {
-        let device = &self.device.device;
-        let flags = vk::CommandPoolResetFlags::empty();
-        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the last submission was waited for, so nothing uses the pool or the queries.
-        unsafe {
-            device
-                .reset_command_pool(self.pool, flags)
-                .map_err(BenchError::hand_written("vkResetCommandPool"))?;
-            let begun = device.begin_command_buffer(self.commands, &info);
-            begun.map_err(BenchError::hand_written("vkBeginCommandBuffer"))
-        }
+        self.pool.reset()?;
+        self.pool.begin(self.commands)
     }
 
     fn write_timestamp(&self, query: u32) {
@@ -172,14 +133,10 @@ impl RawCommands {
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
         let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
         let submits = [submit.signal_semaphore_infos(signals)];
-        // SAFETY: recording ends here; the fence is not signalled; the context holds the queue's lock for the call.
-        unsafe {
-            device
-                .end_command_buffer(self.commands)
-                .map_err(BenchError::hand_written("vkEndCommandBuffer"))?;
-            let submit = |queue| device.queue_submit2(queue, &submits, fence);
-            self.device.ctx.with_raw_queue(submit).map_err(BenchError::hand_written("vkQueueSubmit2"))
-        }
+        self.pool.end(self.commands)?;
+        // SAFETY: recording has ended; the fence is not signalled; the context holds the queue's lock for the call.
+        let submit = |queue| unsafe { device.queue_submit2(queue, &submits, fence) };
+        self.device.ctx.with_raw_queue(submit).map_err(BenchError::hand_written("vkQueueSubmit2"))
     }
 
     fn wait(&self) -> Result<(), BenchError> {
@@ -212,9 +169,7 @@ impl Drop for RawCommands {
         // SAFETY: the last submission was waited for; objects that were never created are null, which is allowed.
         unsafe {
             device.destroy_query_pool(self.queries, None);
-            device.destroy_semaphore(self.timeline, None);
             device.destroy_fence(self.fence, None);
-            device.destroy_command_pool(self.pool, None);
         }
     }
 }

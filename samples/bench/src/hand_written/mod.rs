@@ -5,12 +5,14 @@
 
 mod accel_struct;
 mod buffer;
+mod command_pool;
 mod commands;
 mod device;
 mod frame_ring;
 mod objects;
 mod recorder;
 mod rt_pipeline;
+mod timeline;
 
 pub(super) use accel_struct::{RawAccelStruct, instance_geometry, triangle_geometry};
 pub(super) use commands::RawCommands;

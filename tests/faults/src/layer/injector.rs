@@ -233,7 +233,7 @@ impl Injector {
         }
     }
 
-    /// Logs a name the first time, by the line that `line` makes.
+    /// Logs a line with a name, the first time.
     fn log_name(&self, line: &str) {
         if self.counts().names.insert(line.to_owned()) {
             self.write(line);
