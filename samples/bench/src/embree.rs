@@ -30,6 +30,8 @@ pub(super) struct EmbreeBuild {
     pub(super) medium: Duration,
     /// The same with `RTC_BUILD_QUALITY_HIGH`, which splits triangles.
     pub(super) high: Duration,
+    /// Time of `rtcBuildBVH` with medium quality, whose tree [`Embree::tree`] returns.
+    pub(super) bvh: Duration,
 }
 
 type Object = *mut c_void;
@@ -156,7 +158,8 @@ impl Embree {
         let once = |_| {
             let medium = device.commit(vertices, triangles, MEDIUM)?;
             let high = device.commit(vertices, triangles, HIGH)?;
-            Ok(EmbreeBuild { medium, high })
+            let (bvh, _) = device.tree(positions, triangles)?;
+            Ok(EmbreeBuild { medium, high, bvh })
         };
         (0..runs).map(once).collect()
     }
@@ -167,7 +170,7 @@ impl Embree {
         positions: &[[f32; 3]],
         triangles: &[[u32; 3]],
     ) -> Result<WideTree, EmbreeError> {
-        Device::new(&self.functions, 0)?.tree(positions, triangles)
+        Ok(Device::new(&self.functions, 0)?.tree(positions, triangles)?.1)
     }
 }
 
@@ -254,8 +257,12 @@ impl<'a> Device<'a> {
         Ok(time)
     }
 
-    /// Returns a tree of the triangles.
-    fn tree(&self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<WideTree, EmbreeError> {
+    /// Returns the time of `rtcBuildBVH`, without that of making its primitives, and the tree.
+    fn tree(
+        &self,
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+    ) -> Result<(Duration, WideTree), EmbreeError> {
         let mut primitives: Vec<BuildPrimitive> =
             (0..).zip(triangles).map(|(number, triangle)| bounds_of(positions, triangle, number)).collect();
         // SAFETY: the device is alive.
@@ -284,14 +291,16 @@ impl<'a> Device<'a> {
             user: self.functions,
         };
         // SAFETY: the primitives and the functions outlive the call, and the nodes live as long as the BVH.
-        let tree = unsafe {
+        let built = unsafe {
+            let start = Instant::now();
             let root = (self.functions.build_bvh)(&raw const arguments);
+            let time = start.elapsed();
             let tree = tree_below(root, |number| corners_of(positions, &triangles[number as usize]));
             (self.functions.release_bvh)(bvh);
-            tree
+            (time, tree)
         };
         self.check()?;
-        Ok(tree)
+        Ok(built)
     }
 }
 

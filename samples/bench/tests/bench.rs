@@ -102,6 +102,7 @@ fn builds_are_compared_with_those_of_embree() {
     for name in [
         "total of Embree, medium quality",
         "total of Embree, high quality",
+        "rtcBuildBVH of Embree, medium quality",
         "tree of Embree, medium: SAH cost",
     ] {
         assert!(table.contains(name), "{name}: {table}");

@@ -51,6 +51,11 @@ pub struct RunArgs {
     #[arg(long, conflicts_with = "resume", help_heading = "Window")]
     pub window: bool,
 
+    /// Give the window another size after its first frame, and go on once window and pictures have it, so that a run with a resize
+    /// repeats to the Vulkan call
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, requires = "window", hide = true)]
+    pub resized: Option<[u32; 2]>,
+
     /// Read shaders from a folder like `shaders`, and compile them again when one changes
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "shaders")]
     #[arg(requires = "window", help_heading = "Window")]
@@ -93,6 +98,14 @@ pub struct RunArgs {
     pub check_indices: bool,
 }
 
+/// Parses `640x480`.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIZE).contains(side));
+    text.split_once('x')
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
+        .ok_or_else(|| format!("write a size as 640x480, 1 to {MAX_SIZE} pixels each way"))
+}
+
 impl RunArgs {
     /// Returns the output file of images of the sample called `name`.
     #[must_use]
@@ -116,4 +129,18 @@ pub enum ValidationArg {
     Core,
     /// As `core`, and accesses of shaders on the device; slow.
     Gpu,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_has_two_sides_of_a_picture() {
+        assert_eq!(size("640x480"), Ok([640, 480]));
+        assert_eq!(size("1x16384"), Ok([1, 16_384]));
+        for bad in ["", "640", "x", "0x480", "640x16385", "640x480x2", "-1x2", "a x b"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+    }
 }

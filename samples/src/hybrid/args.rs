@@ -81,7 +81,8 @@ pub enum GBufferArg {
 /// The rasteriser of visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RasterArg {
-    /// Compute shaders if the device supports them, else the hardware rasteriser; prints the time of each over a few frames.
+    /// Compute shaders if the device supports them, else the hardware rasteriser; where frames are timed, prints the time
+    /// of each over a few frames.
     Auto,
     /// Compute shaders with 64-bit atomics; the picture is exactly that of rays.
     Compute,

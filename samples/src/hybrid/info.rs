@@ -62,10 +62,15 @@ a picture gets its name when it is complete. A video of the pictures: ffmpeg -fr
         let mut renderer = HybridRenderer::new(&context, &scene, &config)?;
         let mut summary = summary(&context, &scene, &config, &renderer);
         let first = args.scene.camera.index();
-        // A sequence needs no telling which rasteriser would be faster.
-        if !matches!(setup.args.frames, Some(Frames::Sequence(_)))
-            && let Some(choice) = renderer.choose_raster(&scene.cameras[first])?
-        {
+        // Where frames are timed, so are the rasterisers: not for a sequence, nor for the one picture of a CPU.
+        let is_timed = match &setup.args.frames {
+            Some(frames) => matches!(frames, Frames::Still(_)),
+            None => !context.capabilities().is_cpu,
+        };
+        if is_timed {
+            renderer.choose_raster(&scene.cameras[first])?;
+        }
+        if let Some(choice) = renderer.raster_choice() {
             let _ = write!(summary, "\ngeometry  {choice}");
         }
         let sample = Self::new(renderer, &scene, first, args.lamp == args::Lamp::Circle);

@@ -3,7 +3,7 @@
 use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, CommandBuffer, Context, TextureHandle, TextureRegion};
 
-use super::config::{Bounces, HybridConfig, Method, Raster, RayPath};
+use super::config::{Bounces, HybridConfig, Method, Raster};
 use super::frame::{Lighting, near_plane};
 use super::frame_passes::FramePasses;
 use super::frame_timings::{FrameTimings, GEOMETRY, RAYS};
@@ -121,22 +121,27 @@ impl HybridRenderer {
     }
 
     /// Measures the geometry pass by each rasteriser that there is, where the configuration leaves the choice, which is
-    /// compute then. Returns which one is in use, why, and both times; `None` where no visibility is rasterised.
+    /// compute then. [`Self::raster_choice`] has both times from now on.
     ///
     /// # Errors
     /// [`SampleError::Device`].
-    pub fn choose_raster(&mut self, camera: &Camera) -> Result<Option<RasterChoice>, SampleError> {
+    pub fn choose_raster(&mut self, camera: &Camera) -> Result<(), SampleError> {
         if self.passes.geometry.has_both() {
             let compute = self.measure_raster(camera, Raster::Compute)?;
             let hardware = self.measure_raster(camera, Raster::Hardware)?;
             self.passes.geometry.choose(RasterChoice::by_time(&compute, &hardware));
         }
-        Ok(self.passes.geometry.choice())
+        Ok(())
+    }
+
+    /// Returns the rasteriser in use and why; `None` where no visibility is rasterised.
+    pub fn raster_choice(&self) -> Option<RasterChoice> {
+        self.passes.geometry.choice()
     }
 
     /// The rasteriser in use, where visible triangles are rasterised.
     pub(super) fn raster(&self) -> Option<Raster> {
-        self.passes.geometry.choice().map(|choice| choice.raster)
+        self.raster_choice().map(|choice| choice.raster)
     }
 
     /// True if another one could be.
@@ -215,12 +220,9 @@ impl HybridRenderer {
 
 /// The configuration with what it leaves open decided, and without bounces where nothing mirrors or refracts.
 fn valid_for(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> HybridConfig {
-    let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
-    let suits = match (capabilities.is_cpu, config.knows_triangles()) {
-        (true, _) if can_queue => Bounces::Queued,
-        (false, true) => Bounces::First,
-        _ => Bounces::Inline,
-    };
+    // A CPU driver takes seconds to compile each shader that traces, and a second one saves it no time in a frame.
+    let suits =
+        if config.knows_triangles() && !capabilities.is_cpu { Bounces::First } else { Bounces::Inline };
     HybridConfig {
         max_depth: if goes_on(scene) { config.max_depth } else { 0 },
         bounces: Some(config.bounces.unwrap_or(suits)),

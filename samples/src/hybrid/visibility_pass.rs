@@ -54,7 +54,7 @@ impl VisibilityPass {
             (Some(_), ..) => "as asked for",
             (None, None, _) => "the device has no 64-bit atomics",
             (None, _, None) => "the device cannot number triangles in fragment shaders",
-            (None, Some(_), Some(_)) => "not measured",
+            (None, Some(_), Some(_)) => "exact",
         };
         let mut places =
             VisibilityAddresses { triangle_count, image: NO_IMAGE, ..bytemuck::Zeroable::zeroed() };

@@ -236,6 +236,8 @@ struct Running<S> {
     window: Arc<Window>,
     /// Size of the window in pixels, as it was told last: a window that is gone cannot be asked.
     size: [u32; 2],
+    /// True once the window has been asked for the size of `--resized`.
+    has_asked_for_size: bool,
     /// True until the sample is loaded.
     is_new: bool,
     /// Frames that the window has shown.
@@ -270,6 +272,7 @@ impl<S: Sample> Running<S> {
             ctx,
             window,
             size,
+            has_asked_for_size: false,
             is_new: true,
             frames_here: 0,
             is_suspended: false,
@@ -389,6 +392,9 @@ impl<S: Sample> Running<S> {
             self.panel.animates &= args.frames.is_some() || !self.sample.stands_at_first();
             self.camera_controller = CameraController::new(self.sample.orbits_at_first());
         }
+        if self.is_resizing(args)? {
+            return Ok(Next::Nap);
+        }
         self.ctx.next_frame()?;
         let seconds = self.clock.tick(Instant::now(), self.panel.animates);
         self.follow(args, seconds)?;
@@ -432,7 +438,7 @@ impl<S: Sample> Running<S> {
     /// Draws a frame without an image now and then, so that the loading thread is not delayed. Draws none while the GPU works
     /// for the load, so that the window is not delayed either. Where frames are counted it draws one, so that a run repeats to the call.
     fn redraw_loading(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
-        self.follow_size();
+        self.follow_size(args)?;
         let is_enough = args.frames.is_some() && self.frames_here > 0;
         if is_enough || !self.ctx.is_done(self.latest)? {
             return Ok(Next::Nap);
@@ -456,18 +462,33 @@ impl<S: Sample> Running<S> {
         Ok(Next::Nap)
     }
 
-    /// Resizes the sample once the window keeps its size.
-    fn follow_size(&mut self) {
-        if let Some(size) = self.resize.next(self.size, Instant::now())
-            && let Err(error) = self.sample.resize(size)
-        {
-            print_message("warning", format_args!("pictures keep their size: {error}"));
+    /// Resizes the sample once the window keeps its size. A size that was asked for on the command line must be had.
+    fn follow_size(&mut self, args: &RunArgs) -> Result<(), RunError> {
+        let Some(size) = self.resize.next(self.size, Instant::now()) else { return Ok(()) };
+        let Err(error) = self.sample.resize(size) else { return Ok(()) };
+        let is_tried_again = self.resize.failed(Instant::now());
+        if args.resized.is_some() && !is_tried_again {
+            return Err(error);
         }
+        let so_far = if is_tried_again { " for now" } else { "" };
+        print_message("warning", format_args!("pictures keep their size{so_far}: {error}"));
+        Ok(())
+    }
+
+    /// True after the first frame until window and pictures have the size of `--resized`, which the window is asked for once.
+    fn is_resizing(&mut self, args: &RunArgs) -> Result<bool, RunError> {
+        let Some(size) = args.resized.filter(|_| self.shown == 1) else { return Ok(false) };
+        if !std::mem::replace(&mut self.has_asked_for_size, true) {
+            // `WindowEvent::Resized` tells of the size that the window gets.
+            let _ = self.window.request_inner_size(PhysicalSize::<u32>::from(size));
+        }
+        self.follow_size(args)?;
+        Ok(self.resize.pictures() != size)
     }
 
     /// Applies changes of size, shaders, time and camera.
     fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
-        self.follow_size();
+        self.follow_size(args)?;
         if self.shader_files.as_ref().is_some_and(ShaderFiles::changed) {
             self.reload();
         }

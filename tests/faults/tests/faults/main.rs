@@ -80,11 +80,11 @@ fn in_window() -> Option<(RustConnection, VirtualDisplay, Program)> {
     Some((connection, display, Program { variables, ..program("window") }))
 }
 
-/// Samples in a window.
+/// Samples in a window, which gets another size after its first frame.
 const WINDOWED: [&str; 3] = [
-    "windowed hybrid --rt software --scene SCENE",
-    "windowed hello_triangle",
-    "windowed viewer SCENE --rt query --samples 2",
+    "windowed hybrid --rt software --scene SCENE --resized 480x96",
+    "windowed hello_triangle --resized 480x96",
+    "windowed viewer SCENE --rt query --samples 2 --resized 480x96",
 ];
 
 /// Some of the faults of the whole sweeps, spread evenly.

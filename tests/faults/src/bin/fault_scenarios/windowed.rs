@@ -1,4 +1,4 @@
-//! Samples in a window: their first frames.
+//! Samples in a window: their first frames, before and after it changes its size.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -18,8 +18,7 @@ pub(crate) fn run(name: &str, args: &[String], result: &Path) -> Result<(), Exit
         .map(str::to_owned);
     let ran = run_sample(name, &[args, &size].concat(), &whole);
     let kept = ran.and_then(|()| {
-        let beside =
-            image::open(&whole).map(|image| image.crop_imm(BESIDE_PANEL, 0, WIDTH - BESIDE_PANEL, HEIGHT));
+        let beside = image::open(&whole).map(|image| image.crop_imm(BESIDE_PANEL, 0, u32::MAX, u32::MAX));
         beside.and_then(|image| image.save(result)).map_err(|error| {
             eprintln!("error: {error}");
             ExitCode::FAILURE
