@@ -224,7 +224,7 @@ fn assert_names(text: &str, parts: &[&str]) {
 /// True if a device was found. Returns false and prints a line without a device, if `LVK_SKIP_GPU_TESTS` allows that.
 fn has_device() -> bool {
     let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
-    let found = prepare(&DriverRequest { validation: true });
+    let found = prepare(&DriverRequest { validation: true, quick_compilation: true });
     match found {
         Ok(_) => true,
         Err(error) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {

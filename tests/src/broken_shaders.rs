@@ -2,7 +2,6 @@
 //! take their GLSL from a copy of `shaders/` that is changed and restored (`LVK_SHADERS`).
 #![expect(clippy::expect_used, reason = "a test that cannot change its shaders has failed")]
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -45,8 +44,8 @@ pub struct BrokenShaders {
 }
 
 impl BrokenShaders {
-    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_subprocess`]. Compiling
-    /// takes most of the time, so lavapipe is told not to optimise, and has a shader cache of its own.
+    /// Runs `body` in a process of its own with a copy of the shaders, and a shader cache of its own for lavapipe; `test` as for
+    /// [`in_subprocess`].
     ///
     /// # Panics
     /// As [`in_subprocess`], and when the files cannot be copied.
@@ -55,11 +54,8 @@ impl BrokenShaders {
         let [shaders, compiled] = ["shaders", "compiled"].map(|name| folder.path().join(name));
         copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"), &shaders)
             .expect("the shaders can be copied");
-        let variables = [
-            (VARIABLE, Some(shaders.as_os_str())),
-            ("MESA_SHADER_CACHE_DIR", Some(compiled.as_os_str())),
-            ("GALLIVM_PERF", Some(OsStr::new("nopt"))),
-        ];
+        let variables =
+            [(VARIABLE, Some(shaders.as_os_str())), ("MESA_SHADER_CACHE_DIR", Some(compiled.as_os_str()))];
         in_subprocess(test, &variables, || {
             let folder = std::env::var_os(VARIABLE).expect("the parent has named the folder");
             body(&Self { folder: PathBuf::from(folder) });

@@ -222,7 +222,8 @@ struct Loader {
 fn loader() -> Result<&'static Loader, &'static str> {
     static LOADER: OnceLock<Result<Loader, String>> = OnceLock::new();
     let found = LOADER.get_or_init(|| {
-        let request = DriverRequest { validation: !matches!(validation(), ValidationMode::Off) };
+        let validation = !matches!(validation(), ValidationMode::Off);
+        let request = DriverRequest { validation, quick_compilation: true };
         let driver = prepare(&request).map_err(|error| error.to_string())?;
         let has_nvidia = keep_drivers(driver.loader.as_deref()).contains(&vk::DriverId::NVIDIA_PROPRIETARY);
         Ok(Loader { library: driver.loader, has_nvidia })

@@ -37,7 +37,7 @@ pub(super) struct DefaultBy<T> {
 
 impl Setup {
     pub(super) fn new(args: &BenchArgs) -> Result<Self, BenchError> {
-        let driver = prepare(&DriverRequest { validation: args.validate })?;
+        let driver = prepare(&DriverRequest { validation: args.validate, ..DriverRequest::default() })?;
         Ok(Self {
             loader: driver.loader,
             device: args.device.clone(),

@@ -55,6 +55,9 @@ static PREPARED: Mutex<Option<Prepared>> = Mutex::new(None);
 pub struct DriverRequest {
     /// Also provide a current Khronos validation layer.
     pub validation: bool,
+    /// Let the downloaded driver compile shaders without optimisation (`GALLIVM_PERF=nopt`, unless the variable is set): for
+    /// tests, which compile for longer than their shaders run. Counts in the first call of a process.
+    pub quick_compilation: bool,
 }
 
 /// A Vulkan driver that this process can use.
@@ -160,7 +163,7 @@ impl Prepared {
         if let Some(report) = &driver.system {
             eprintln!("lvk: a software driver is used, because {}", report.summary());
         }
-        loader_environment::set_variables(&settings, &driver);
+        loader_environment::set_variables(&settings, &driver, request.quick_compilation);
         Ok(Self { settings, driver, has_layer: request.validation })
     }
 }

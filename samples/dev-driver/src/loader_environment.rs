@@ -10,12 +10,14 @@ use crate::{Driver, DriverOrigin};
 
 /// Folder of Mesa's shader cache. Mesa uses the user's cache folder if the variable is not set.
 const MESA_CACHE: &str = "MESA_SHADER_CACHE_DIR";
+/// Options of lavapipe's compiler. Its cache keeps programs of other options apart.
+const MESA_COMPILER: &str = "GALLIVM_PERF";
 
 /// Sets the variables for `driver` and for layers, once per process.
 ///
 /// The list contains layer folders that do not exist yet. The loader skips them, and finds a layer that is downloaded later
 /// without another change of the environment.
-pub(super) fn set_variables(settings: &Settings, driver: &Driver) {
+pub(super) fn set_variables(settings: &Settings, driver: &Driver, quick_compilation: bool) {
     let (name, value) =
         layer_variable(env::var_os("VK_LAYER_PATH"), env::var_os("VK_ADD_LAYER_PATH"), &settings.folders);
     let folder = match &driver.origin {
@@ -23,6 +25,7 @@ pub(super) fn set_variables(settings: &Settings, driver: &Driver) {
         DriverOrigin::System => None,
     };
     let has_shader_cache = env::var_os(MESA_CACHE).is_some();
+    let is_quick = quick_compilation && env::var_os(MESA_COMPILER).is_none();
     // SAFETY: changing the environment is unsound only while another thread reads it through the C library.
     // This runs once per process, under the lock of `prepare`, whose documentation requires the call before the first
     // Vulkan call. Other threads of this project read the environment through `std` only, which locks.
@@ -32,6 +35,9 @@ pub(super) fn set_variables(settings: &Settings, driver: &Driver) {
             env::set_var("VK_DRIVER_FILES", folder.join(DRIVER_JSON));
             if !has_shader_cache {
                 env::set_var(MESA_CACHE, folder.with_file_name("shader_cache"));
+            }
+            if is_quick {
+                env::set_var(MESA_COMPILER, "nopt");
             }
         }
     }

@@ -202,7 +202,8 @@ impl<'a> SampleSetup<'a> {
     /// [`RunError::Device`] and [`RunError::Driver`].
     pub fn device(&mut self, needs: &DeviceNeeds) -> Result<Context, RunError> {
         self.progress.pause();
-        let driver = prepare(&DriverRequest { validation: self.args.validate.is_some() })?;
+        let driver =
+            prepare(&DriverRequest { validation: self.args.validate.is_some(), ..DriverRequest::default() })?;
         self.progress.stage("setup the device", 0);
         device::open(self.name, self.args, &driver, self.sink, needs, self.window.clone())
     }

@@ -144,7 +144,7 @@ pub(crate) fn has_device() -> bool {
     if !is_set("LVK_SKIP_GPU_TESTS") || is_set("LVK_REQUIRE_GPU") {
         return true;
     }
-    let found = prepare(&DriverRequest { validation: true });
+    let found = prepare(&DriverRequest { validation: true, ..DriverRequest::default() });
     if let Err(error) = &found {
         eprintln!("SKIPPED, no Vulkan device: {error}");
     }

@@ -17,7 +17,7 @@ const FAMILY: u32 = 0;
 
 /// Opens wgpu, a device with the requirements of both libraries, and `lvk` on it.
 pub(crate) fn open(validation: bool) -> Result<(Context, wgpu::Device, wgpu::Queue), Error> {
-    if let Some(loader) = prepare(&DriverRequest { validation })?.loader {
+    if let Some(loader) = prepare(&DriverRequest { validation, ..DriverRequest::default() })?.loader {
         // SAFETY: the library is a Vulkan loader. wgpu opens it by its bare name, which finds the open library.
         std::mem::forget(unsafe { ash::Entry::load_from(loader) }?);
     }

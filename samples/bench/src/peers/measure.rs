@@ -47,7 +47,7 @@ pub fn run(entries: &[PeerEntry], args: &PeersArgs, options: &RunOptions) -> Res
         serve(entry, row, &args.workload(&args.class))?;
     }
     let entries = chosen(entries, &args.peers)?;
-    prepare(&DriverRequest { validation: options.validate })?;
+    prepare(&DriverRequest { validation: options.validate, ..DriverRequest::default() })?;
     let log = options.validate.then(tempfile::NamedTempFile::new).transpose()?;
     let launch = Launch {
         program: std::env::current_exe()?,

@@ -83,7 +83,7 @@ fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
 /// Opens a context with the driver of tests and, where the environment asks for it, the validation layer.
 fn context_without_caches(desc: ContextDesc<'_>) -> Result<Context, Failure> {
     let validates = std::env::var_os("LVK_FAULT_VALIDATE").is_some();
-    let driver = prepare(&DriverRequest { validation: validates })?;
+    let driver = prepare(&DriverRequest { validation: validates, ..DriverRequest::default() })?;
     Ok(Context::new(&ContextDesc {
         application_name: "faults",
         vulkan_library: driver.loader.as_deref(),
