@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_dev_driver::{DriverRequest, prepare_unless_skipped};
 
 /// A program, and the arguments that make it quick.
 struct Program {
@@ -223,16 +223,7 @@ fn assert_names(text: &str, parts: &[&str]) {
 
 /// True if a device was found. Returns false and prints a line without a device, if `LVK_SKIP_GPU_TESTS` allows that.
 fn has_device() -> bool {
-    let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
-    let found = prepare(&DriverRequest { validation: true, quick_compilation: true });
-    match found {
-        Ok(_) => true,
-        Err(error) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
-            eprintln!("SKIPPED, no Vulkan device: {error}");
-            false
-        }
-        Err(error) => panic!("{error}"),
-    }
+    prepare_unless_skipped(&DriverRequest { validation: true, quick_compilation: true }).unwrap()
 }
 
 /// The programs that the device is enough for; says of the other that it is not tested.

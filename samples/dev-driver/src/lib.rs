@@ -55,8 +55,8 @@ static PREPARED: Mutex<Option<Prepared>> = Mutex::new(None);
 pub struct DriverRequest {
     /// Also provide a current Khronos validation layer.
     pub validation: bool,
-    /// Let the downloaded driver compile shaders without optimisation (`GALLIVM_PERF=nopt`, unless the variable is set): for
-    /// tests, which compile for longer than their shaders run. Counts in the first call of a process.
+    /// Let the downloaded driver compile shaders without optimisation (`GALLIVM_PERF=nopt`, unless the variable is set). Tests ask for
+    /// it, as most of them compile a shader for longer than the shader runs. The first call of a process decides.
     pub quick_compilation: bool,
 }
 
@@ -111,6 +111,23 @@ pub fn prepare(request: &DriverRequest) -> Result<Driver, DriverError> {
         prepared.has_layer = true;
     }
     Ok(prepared.driver.clone())
+}
+
+/// Calls [`prepare`] for a test that needs a device. Returns false and prints a line where there is no driver, if the environment has
+/// `LVK_SKIP_GPU_TESTS` and no `LVK_REQUIRE_GPU`.
+///
+/// # Errors
+/// As [`prepare`], unless the test is to be skipped.
+pub fn prepare_unless_skipped(request: &DriverRequest) -> Result<bool, DriverError> {
+    let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
+    match prepare(request) {
+        Ok(_) => Ok(true),
+        Err(error) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
+            eprintln!("SKIPPED, no Vulkan device: {error}");
+            Ok(false)
+        }
+        Err(error) => Err(error),
+    }
 }
 
 /// Returns the path of SwiftShader's driver manifest (ICD JSON). SwiftShader is a software driver with Vulkan 1.3 and without

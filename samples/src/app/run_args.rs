@@ -53,7 +53,7 @@ pub struct RunArgs {
 
     /// Give the window another size after its first frame, and go on once window and pictures have it, so that a run with a resize
     /// repeats to the Vulkan call
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, requires = "window", hide = true)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, requires = "window", requires = "frames", hide = true)]
     pub resized: Option<[u32; 2]>,
 
     /// Read shaders from a folder like `shaders`, and compile them again when one changes

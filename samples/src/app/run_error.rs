@@ -75,6 +75,9 @@ pub enum RunError {
         /// Error of the window system.
         reason: String,
     },
+    /// The window system gave the window no other size.
+    #[error("--resized: the window did not get this size; leave the option out")]
+    WindowKeepsSize,
     /// The program has no windows.
     #[error(
         "--window: this program was built without windows; build it with them by \
@@ -144,7 +147,7 @@ impl RunError {
             Self::Sample(error) => error.status(),
             Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
-            Self::NoScreenshot { .. } | Self::WindowLost(_) => 1,
+            Self::NoScreenshot { .. } | Self::WindowLost(_) | Self::WindowKeepsSize => 1,
             Self::Driver(_) | Self::Validation(_) | Self::IndexFaults(_) => 1,
         }
     }

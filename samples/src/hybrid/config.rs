@@ -21,8 +21,7 @@ pub enum Method {
 pub enum Geometry {
     /// Position, normals, albedo and triangle of each pixel, as in the paper.
     Paper,
-    /// The triangle of each pixel, by some rasteriser; `None` takes compute where the device can, and can be chosen
-    /// anew by [`HybridRenderer::choose_raster`](super::HybridRenderer::choose_raster).
+    /// The triangle of each pixel, by some rasteriser; `None` takes compute where the device can.
     Visibility(Option<Raster>),
 }
 

@@ -62,19 +62,23 @@ a picture gets its name when it is complete. A video of the pictures: ffmpeg -fr
         let mut renderer = HybridRenderer::new(&context, &scene, &config)?;
         let mut summary = summary(&context, &scene, &config, &renderer);
         let first = args.scene.camera.index();
-        // Where frames are timed, so are the rasterisers: not for a sequence, nor for the one picture of a CPU.
-        let is_timed = match &setup.args.frames {
-            Some(frames) => matches!(frames, Frames::Still(_)),
-            None => !context.capabilities().is_cpu,
-        };
-        if is_timed {
-            renderer.choose_raster(&scene.cameras[first])?;
+        if is_timed(setup.args.frames.as_ref(), context.capabilities().is_cpu) {
+            renderer.measure_rasters(&scene.cameras[first])?;
         }
         if let Some(choice) = renderer.raster_choice() {
             let _ = write!(summary, "\ngeometry  {choice}");
         }
         let sample = Self::new(renderer, &scene, first, args.lamp == args::Lamp::Circle);
         Ok(ReadySample { sample, summary })
+    }
+}
+
+/// True if frames are rendered again and again to time them. Then the rasterisers are timed too.
+fn is_timed(frames: Option<&Frames>, is_cpu: bool) -> bool {
+    match frames {
+        Some(Frames::Still(count)) => *count > 1,
+        Some(Frames::Sequence(_)) => false,
+        None => !is_cpu,
     }
 }
 
@@ -166,6 +170,16 @@ mod tests {
     use crate::app::frames::Frames;
     use crate::app::ray_args::RayTracing;
     use crate::app::run_args::ValidationArg;
+
+    #[test]
+    fn rasterisers_are_timed_where_frames_are() {
+        for is_cpu in [false, true] {
+            assert_eq!(is_timed(None, is_cpu), !is_cpu);
+            assert!(!is_timed(Some(&Frames::Still(1)), is_cpu));
+            assert!(is_timed(Some(&Frames::Still(2)), is_cpu));
+            assert!(!is_timed(Some(&Frames::Sequence(0..9)), is_cpu));
+        }
+    }
 
     fn parsed(line: &str) -> Result<CommandLine<HybridArgs>, clap::Error> {
         parse_line::<HybridSequence>(line)

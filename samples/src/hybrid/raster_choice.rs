@@ -17,7 +17,7 @@ impl RasterChoice {
     /// Compute, whose picture is that of rays, with the milliseconds of some frames of each in the reason. Hardware
     /// may be faster, but misses what shows through gaps narrower than a pixel, so it is taken only by wish or where
     /// nothing else can.
-    pub(super) fn by_time(compute_ms: &[f64], hardware_ms: &[f64]) -> Self {
+    pub(super) fn compute(compute_ms: &[f64], hardware_ms: &[f64]) -> Self {
         let best = |times: &[f64]| times.iter().copied().filter(|ms| *ms > 0.0).min_by(f64::total_cmp);
         let why = match (best(compute_ms), best(hardware_ms)) {
             (Some(compute), Some(hardware)) => {
@@ -45,10 +45,10 @@ mod tests {
 
     #[test]
     fn the_exact_one_is_taken_and_the_reason_says_both_times() {
-        let choice = RasterChoice::by_time(&[0.3, 0.2, 9.0], &[0.7, 0.15]);
+        let choice = RasterChoice::compute(&[0.3, 0.2, 9.0], &[0.7, 0.15]);
         assert_eq!(choice.to_string(), "compute rasteriser (exact; 0.200 ms beside 0.150 ms by hardware)");
         for (compute, hardware) in [(&[][..], &[][..]), (&[0.0], &[0.5]), (&[0.5], &[])] {
-            let choice = RasterChoice::by_time(compute, hardware);
+            let choice = RasterChoice::compute(compute, hardware);
             assert_eq!(choice.raster, Raster::Compute);
             assert!(choice.why.contains("no timestamps"), "{choice}");
         }

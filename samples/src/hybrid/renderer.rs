@@ -120,16 +120,16 @@ impl HybridRenderer {
         Ok(())
     }
 
-    /// Measures the geometry pass by each rasteriser that there is, where the configuration leaves the choice, which is
-    /// compute then. [`Self::raster_choice`] has both times from now on.
+    /// Measures the geometry pass by each rasteriser, where the configuration leaves the choice and the device has both.
+    /// [`Self::raster_choice`] has both times from now on.
     ///
     /// # Errors
     /// [`SampleError::Device`].
-    pub fn choose_raster(&mut self, camera: &Camera) -> Result<(), SampleError> {
+    pub fn measure_rasters(&mut self, camera: &Camera) -> Result<(), SampleError> {
         if self.passes.geometry.has_both() {
             let compute = self.measure_raster(camera, Raster::Compute)?;
             let hardware = self.measure_raster(camera, Raster::Hardware)?;
-            self.passes.geometry.choose(RasterChoice::by_time(&compute, &hardware));
+            self.passes.geometry.choose(RasterChoice::compute(&compute, &hardware));
         }
         Ok(())
     }

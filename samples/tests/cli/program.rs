@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::sync::Once;
 
-use lvk_dev_driver::{DriverRequest, prepare, swiftshader_icd};
+use lvk_dev_driver::{DriverRequest, prepare_unless_skipped, swiftshader_icd};
 use tempfile::TempDir;
 
 pub(crate) const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
@@ -140,15 +140,7 @@ pub(crate) fn hybrid(args: &[&str]) -> Command {
 
 /// True if a device was found. Returns false and prints a line without a device, if `LVK_SKIP_GPU_TESTS` allows that.
 pub(crate) fn has_device() -> bool {
-    let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
-    if !is_set("LVK_SKIP_GPU_TESTS") || is_set("LVK_REQUIRE_GPU") {
-        return true;
-    }
-    let found = prepare(&DriverRequest { validation: true, ..DriverRequest::default() });
-    if let Err(error) = &found {
-        eprintln!("SKIPPED, no Vulkan device: {error}");
-    }
-    found.is_ok()
+    prepare_unless_skipped(&DriverRequest { validation: true, quick_compilation: true }).unwrap()
 }
 
 /// A desk with a scene, where a device can render it.

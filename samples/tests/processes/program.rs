@@ -8,7 +8,7 @@ use std::process::{Child, Command, ExitStatus};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant, SystemTime};
 
-use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_dev_driver::{DriverRequest, prepare_unless_skipped};
 use tempfile::TempDir;
 
 /// Longest time of a run. The machine may be busy.
@@ -299,13 +299,5 @@ fn name(path: &Path) -> String {
 
 /// True if a device was found. Returns false and prints a line without a device, if `LVK_SKIP_GPU_TESTS` allows that.
 pub(crate) fn has_device() -> bool {
-    let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
-    match prepare(&DriverRequest { validation: false, quick_compilation: true }) {
-        Ok(_) => true,
-        Err(error) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
-            eprintln!("SKIPPED, no Vulkan device: {error}");
-            false
-        }
-        Err(error) => panic!("{error}"),
-    }
+    prepare_unless_skipped(&DriverRequest { validation: false, quick_compilation: true }).unwrap()
 }

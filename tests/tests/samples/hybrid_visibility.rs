@@ -149,7 +149,7 @@ fn the_choice_of_a_rasteriser_is_reported_and_leaves_an_image() {
         [(COMPUTE, "as asked for"), (HARDWARE, "as asked for"), (Geometry::default(), "")]
     {
         let mut renderer = HybridRenderer::new(&ctx, &scene, &config(path, geometry)).unwrap();
-        renderer.choose_raster(&scene.cameras[0]).unwrap();
+        renderer.measure_rasters(&scene.cameras[0]).unwrap();
         let choice = renderer.raster_choice().unwrap();
         assert!(choice.to_string().contains(reason), "{choice}");
         let named = matches!(geometry, Geometry::Visibility(Some(raster)) if raster != choice.raster);
@@ -164,6 +164,6 @@ fn the_choice_of_a_rasteriser_is_reported_and_leaves_an_image() {
         assert!(renderer.read_image().unwrap() == expected[0].as_raw()[..], "{choice}: another picture");
     }
     let mut paper = HybridRenderer::new(&ctx, &scene, &config(path, Geometry::Paper)).unwrap();
-    paper.choose_raster(&scene.cameras[0]).unwrap();
+    paper.measure_rasters(&scene.cameras[0]).unwrap();
     assert_eq!(paper.raster_choice(), None);
 }

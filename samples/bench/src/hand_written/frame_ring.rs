@@ -58,9 +58,11 @@ impl RawFrameRing {
         let recorded = elapsed_ms(start);
         self.submit(&self.slots[slot])?;
         self.next.set(1 - slot);
-        self.slots[1 - slot].begin()?;
+        let begun = self.slots[1 - slot].begin();
         let submitted = elapsed_ms(start);
+        // The slot is in use until the wait, whatever became of the other one.
         self.timeline.wait()?;
+        begun?;
         Ok(FrameParts { begin: 0.0, record: recorded, submit: submitted - recorded })
     }
 

@@ -185,7 +185,7 @@ impl<'a> MethodPair<'a> {
             HybridRenderer::new(ctx, scene, &config)
         };
         let (standalone, mut hybrid) = (renderer(Method::Standalone)?, renderer(Method::Hybrid)?);
-        hybrid.choose_raster(&scene.cameras[0])?;
+        hybrid.measure_rasters(&scene.cameras[0])?;
         let rasteriser =
             hybrid.raster_choice().map_or_else(|| "none".to_owned(), |choice| choice.to_string());
         Ok(Self { plan, path, standalone, hybrid, rasteriser, done: 0 })

@@ -13,7 +13,6 @@ const TRIES: u32 = 3;
 #[derive(Debug)]
 pub(super) struct ResizeDebounce {
     pictures: [u32; 2],
-    before: [u32; 2],
     window: [u32; 2],
     changed: Option<Instant>,
     failures: u32,
@@ -22,7 +21,7 @@ pub(super) struct ResizeDebounce {
 impl ResizeDebounce {
     /// For pictures of this size.
     pub(super) fn new(pictures: [u32; 2]) -> Self {
-        Self { pictures, before: pictures, window: pictures, changed: None, failures: 0 }
+        Self { pictures, window: pictures, changed: None, failures: 0 }
     }
 
     /// Returns the size of pictures.
@@ -30,7 +29,8 @@ impl ResizeDebounce {
         self.pictures
     }
 
-    /// The window has this size now. Answers a size that pictures are to get, once; [`failed`](Self::failed) makes it another time.
+    /// Takes the current size of the window. Returns a size that pictures are to get, once; then [`resized`](Self::resized) or
+    /// [`failed`](Self::failed) says whether they have it.
     pub(super) fn next(&mut self, window: [u32; 2], now: Instant) -> Option<[u32; 2]> {
         if window != self.window {
             (self.window, self.changed, self.failures) = (window, Some(now), 0);
@@ -41,19 +41,19 @@ impl ResizeDebounce {
         }
         self.changed = None;
         let is_news = self.window != self.pictures && !self.window.contains(&0);
-        if is_news {
-            self.before = std::mem::replace(&mut self.pictures, self.window);
-        }
         is_news.then_some(self.window)
     }
 
-    /// The pictures could not get the size that [`next`](Self::next) answered. Returns true if they are to be tried again after a rest.
+    /// Records that the pictures have the size of the window.
+    pub(super) fn resized(&mut self) {
+        self.pictures = self.window;
+    }
+
+    /// Records that the pictures keep their size. Returns true if they are to be tried again after a rest.
     pub(super) fn failed(&mut self, now: Instant) -> bool {
         self.failures += 1;
         let is_tried_again = self.failures < TRIES;
-        if is_tried_again {
-            (self.pictures, self.changed) = (self.before, Some(now));
-        }
+        self.changed = is_tried_again.then_some(now);
         is_tried_again
     }
 }
@@ -72,32 +72,38 @@ mod tests {
         assert_eq!(resize.next([10, 8], at(150)), None, "still under way");
         assert_eq!(resize.next([10, 8], at(290)), None);
         assert_eq!(resize.next([10, 8], at(300)), Some([10, 8]));
+        resize.resized();
         assert_eq!(resize.next([10, 8], at(600)), None, "once");
         for (time, size) in [(700, [0, 0]), (900, [0, 0]), (1000, [10, 8]), (1200, [10, 8])] {
             assert_eq!(resize.next(size, at(time)), None, "minimised and back again");
         }
     }
 
+    /// Has the window another size, in which pictures fail this many times.
+    fn fail(resize: &mut ResizeDebounce, size: [u32; 2], times: u32, now: Instant) {
+        assert_eq!(resize.next(size, now), None);
+        for time in 1..=times {
+            let now = now + 2 * time * REST;
+            assert_eq!(resize.next(size, now), Some(size), "try {time}");
+            assert_eq!(resize.failed(now), time < TRIES);
+            assert_eq!(resize.next(size, now + REST / 2), None, "a rest comes first");
+        }
+    }
+
     #[test]
     fn pictures_are_tried_three_times_in_a_size() {
         let start = Instant::now();
-        let at = |milliseconds| start + Duration::from_millis(milliseconds);
+        let at = |seconds| start + Duration::from_secs(seconds);
         let mut resize = ResizeDebounce::new([8, 8]);
-        for size in [[9, 8], [10, 8]] {
-            assert_eq!(resize.next(size, at(0)), None);
-            assert_eq!(resize.next(size, at(200)), Some(size));
-            assert!(resize.failed(at(200)));
-            assert_eq!(resize.next(size, at(300)), None, "a rest comes first");
-            assert_eq!(resize.next(size, at(400)), Some(size));
-            assert!(resize.failed(at(400)));
-            assert_eq!(resize.next(size, at(600)), Some(size));
-            assert!(!resize.failed(at(600)));
-            assert_eq!(resize.next(size, at(900)), None, "given up");
-        }
-        // A failure leaves the size to come back to.
-        assert_eq!(resize.next([11, 8], at(1000)), None);
-        assert_eq!(resize.next([11, 8], at(1200)), Some([11, 8]));
-        assert!(resize.failed(at(1200)));
-        assert_eq!(resize.pictures(), [10, 8]);
+        fail(&mut resize, [9, 8], 3, at(0));
+        assert_eq!(resize.next([9, 8], at(9)), None, "given up");
+        assert_eq!(resize.pictures(), [8, 8]);
+        // A size that failed is tried anew when the window comes back to it.
+        fail(&mut resize, [10, 8], 1, at(10));
+        fail(&mut resize, [9, 8], 2, at(20));
+        assert_eq!(resize.next([9, 8], at(30)), Some([9, 8]));
+        resize.resized();
+        assert_eq!(resize.next([9, 8], at(40)), None);
+        assert_eq!(resize.pictures(), [9, 8]);
     }
 }

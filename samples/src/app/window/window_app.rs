@@ -37,6 +37,9 @@ use crate::shader_folder;
 /// Time between two looks at a window that shows nothing.
 const NAP: Duration = Duration::from_millis(30);
 
+/// Time in which a window must get the size of `--resized`.
+const RESIZE_PATIENCE: Duration = Duration::from_secs(60);
+
 /// Shows the sample that `make` makes, until its window is closed or `--frames` are shown. Messages of the validation layer
 /// go into `sink`.
 pub(in crate::app) fn run<S, M>(
@@ -236,8 +239,8 @@ struct Running<S> {
     window: Arc<Window>,
     /// Size of the window in pixels, as it was told last: a window that is gone cannot be asked.
     size: [u32; 2],
-    /// True once the window has been asked for the size of `--resized`.
-    has_asked_for_size: bool,
+    /// The time at which the window was asked for the size of `--resized`.
+    asked_for_size: Option<Instant>,
     /// True until the sample is loaded.
     is_new: bool,
     /// Frames that the window has shown.
@@ -272,7 +275,7 @@ impl<S: Sample> Running<S> {
             ctx,
             window,
             size,
-            has_asked_for_size: false,
+            asked_for_size: None,
             is_new: true,
             frames_here: 0,
             is_suspended: false,
@@ -462,10 +465,13 @@ impl<S: Sample> Running<S> {
         Ok(Next::Nap)
     }
 
-    /// Resizes the sample once the window keeps its size. A size that was asked for on the command line must be had.
+    /// Resizes the sample once the window keeps its size. Pictures that cannot have the size of `--resized` are an error.
     fn follow_size(&mut self, args: &RunArgs) -> Result<(), RunError> {
         let Some(size) = self.resize.next(self.size, Instant::now()) else { return Ok(()) };
-        let Err(error) = self.sample.resize(size) else { return Ok(()) };
+        let Err(error) = self.sample.resize(size) else {
+            self.resize.resized();
+            return Ok(());
+        };
         let is_tried_again = self.resize.failed(Instant::now());
         if args.resized.is_some() && !is_tried_again {
             return Err(error);
@@ -478,12 +484,20 @@ impl<S: Sample> Running<S> {
     /// True after the first frame until window and pictures have the size of `--resized`, which the window is asked for once.
     fn is_resizing(&mut self, args: &RunArgs) -> Result<bool, RunError> {
         let Some(size) = args.resized.filter(|_| self.shown == 1) else { return Ok(false) };
-        if !std::mem::replace(&mut self.has_asked_for_size, true) {
-            // `WindowEvent::Resized` tells of the size that the window gets.
-            let _ = self.window.request_inner_size(PhysicalSize::<u32>::from(size));
-        }
         self.follow_size(args)?;
-        Ok(self.resize.pictures() != size)
+        if self.resize.pictures() == size {
+            return Ok(false);
+        }
+        match self.asked_for_size {
+            None => {
+                // `WindowEvent::Resized` tells of the size that the window gets.
+                let _ = self.window.request_inner_size(PhysicalSize::<u32>::from(size));
+                self.asked_for_size = Some(Instant::now());
+            }
+            Some(asked) if asked.elapsed() > RESIZE_PATIENCE => return Err(RunError::WindowKeepsSize),
+            Some(_) => {}
+        }
+        Ok(true)
     }
 
     /// Applies changes of size, shaders, time and camera.

@@ -5,6 +5,10 @@ use super::verdict::RunOutcome;
 use crate::call_log::Call;
 use crate::fault::{Fault, FaultError, PROGRESS, Span};
 
+/// Command that the allocator calls again at once, for a block of another size. That block may also serve objects for which the run
+/// without a fault allocates another one, so that there are no more calls in all.
+const ALLOCATION: &str = "vkAllocateMemory";
+
 /// True if the calls of a run with `fault` show what the library does in place of the calls of `command` that have failed.
 pub(super) fn is_seen(
     instead: Instead,
@@ -17,9 +21,9 @@ pub(super) fn is_seen(
     match instead {
         // How often a program asks depends on the speed of the device.
         Instead::AsksAgain if fault.span == Span::Once => is_followed_by_success(command, &found.calls),
-        // A block of another size may serve objects that have a block of their own otherwise.
         Instead::CallsAgain if fault.span == Span::Once => {
-            calls(found) > calls(clean) || is_called_again_at_once(command, &found.calls)
+            calls(found) > calls(clean)
+                || (command == ALLOCATION && is_called_again_at_once(command, &found.calls))
         }
         // Where later calls fail too, a second call fails.
         Instead::CallsAgain | Instead::AsksAgain => {
@@ -36,11 +40,11 @@ fn count(outcome: &RunOutcome, counts: impl Fn(&Call) -> bool) -> usize {
     outcome.calls.iter().filter(|call| counts(call)).count()
 }
 
-/// True if the next call of all behind each one of `command` that fails is one of `command` that succeeds.
+/// True if a call of `command` has failed, and the next call of all behind each one that fails is one of `command` that succeeds.
 fn is_called_again_at_once(command: &str, calls: &[Call]) -> bool {
-    let is_again = |call: Option<&Call>| call.is_some_and(|call| call.command == command && !call.fails);
-    let failures = (0..calls.len()).filter(|place| calls[*place].command == command && calls[*place].fails);
-    failures.map(|place| calls.get(place + 1)).all(is_again)
+    let failures = calls.iter().enumerate().filter(|(_, call)| call.command == command && call.fails);
+    let mut next = failures.map(|(place, _)| calls.get(place + 1)).peekable();
+    next.peek().is_some() && next.all(|call| call.is_some_and(|call| call.command == command && !call.fails))
 }
 
 /// True if a call of `command` that succeeds lies behind each one that fails.
@@ -96,11 +100,14 @@ mod tests {
         let again = |span, found: &str| seen(Instead::CallsAgain, "vkMapMemory", span, found, "vkMapMemory");
         assert!(again(Span::Once, "vkMapMemory! vkMapMemory"));
         assert!(!again(Span::Once, "vkMapMemory!"));
-        let with_two = |found: &str| {
-            seen(Instead::CallsAgain, "vkMapMemory", Span::Once, found, "vkMapMemory vkMapMemory")
+        let with_two = |command: &str, found: &str| {
+            let [found, without] = [found, "call call"].map(|text| text.replace("call", command));
+            seen(Instead::CallsAgain, command, Span::Once, &found, &without)
         };
-        assert!(with_two("vkMapMemory! vkMapMemory vkCreateBuffer"), "at once");
-        assert!(!with_two("vkMapMemory! vkCreateBuffer vkMapMemory"), "as often, and later");
+        assert!(with_two(ALLOCATION, "call! call vkCreateBuffer"), "at once");
+        assert!(!with_two(ALLOCATION, "call! vkCreateBuffer call"), "as often, and later");
+        assert!(!with_two(ALLOCATION, "call call"), "none fails");
+        assert!(!with_two("vkCreateBuffer", "call! call vkBindBufferMemory"), "another buffer");
         for span in [Span::Command, Span::Stays, Span::Unanswered] {
             assert!(again(span, "vkMapMemory! vkMapMemory!"), "{span:?}");
             assert!(!again(span, "vkMapMemory vkMapMemory!"), "{span:?}");

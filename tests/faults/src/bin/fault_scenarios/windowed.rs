@@ -18,7 +18,8 @@ pub(crate) fn run(name: &str, args: &[String], result: &Path) -> Result<(), Exit
         .map(str::to_owned);
     let ran = run_sample(name, &[args, &size].concat(), &whole);
     let kept = ran.and_then(|()| {
-        let beside = image::open(&whole).map(|image| image.crop_imm(BESIDE_PANEL, 0, u32::MAX, u32::MAX));
+        let beside = image::open(&whole)
+            .map(|image| image.crop_imm(BESIDE_PANEL, 0, image.width() - BESIDE_PANEL, image.height()));
         beside.and_then(|image| image.save(result)).map_err(|error| {
             eprintln!("error: {error}");
             ExitCode::FAILURE
