@@ -152,6 +152,7 @@ impl MemoryPlacement {
 pub(crate) struct DeviceMemory {
     allocator: Allocator,
     slab_pools: Vec<SlabPool>,
+    properties: vk::PhysicalDeviceMemoryProperties,
 }
 
 /// Slots for objects of the same class.
@@ -222,7 +223,9 @@ impl DeviceMemory {
             allocation_sizes: AllocationSizes::default(),
         })
         .map_err(|error| Error::unsupported("memory allocation", error.to_string()))?;
-        Ok(Self { allocator, slab_pools: Vec::new() })
+        // SAFETY: the physical device belongs to the instance.
+        let properties = unsafe { instance.get_physical_device_memory_properties(physical_device) };
+        Ok(Self { allocator, slab_pools: Vec::new(), properties })
     }
 
     /// Allocates memory for one object. If a block for small objects cannot be allocated, the object gets a
@@ -234,6 +237,13 @@ impl DeviceMemory {
         memory: MemoryKind,
         linear: bool,
     ) -> Allocated<ObjectMemory> {
+        let type_bits = requirements.memory_type_bits;
+        // The allocator compares the size with the heap of its first choice, and not with that of its second.
+        if memory == MemoryKind::HostVisible
+            && second_choice_heap(&self.properties, type_bits).is_some_and(|bytes| requirements.size > bytes)
+        {
+            return Err(AllocationError::OutOfMemory);
+        }
         if let Some(kind) = SlabClass::from_requirements(&requirements, memory, linear)
             && let Ok(shared) = self.allocate_slot(name, kind, requirements.size)
         {
@@ -278,6 +288,16 @@ impl DeviceMemory {
     pub(crate) fn blocks(&self) -> (usize, u64) {
         (self.allocator.generate_report().blocks.len(), self.allocator.capacity())
     }
+}
+
+/// Returns the bytes of the heap from which the allocator takes host-visible memory when its first choice, which is also local to the
+/// device, has failed.
+fn second_choice_heap(properties: &vk::PhysicalDeviceMemoryProperties, type_bits: u32) -> Option<u64> {
+    let flags = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+    let mut types = properties.memory_types_as_slice().iter().enumerate();
+    let (_, found) =
+        types.find(|(number, kind)| type_bits & 1 << number != 0 && kind.property_flags.contains(flags))?;
+    properties.memory_heaps_as_slice().get(found.heap_index as usize).map(|heap| heap.size)
 }
 
 /// Allocates memory of the allocator's blocks. If no further block fits on the device or can be mapped, the memory gets an
@@ -340,6 +360,30 @@ mod tests {
             assert!(!is_mapping(failed.wrapping_add(offset as usize), offset, 4096), "{offset}");
         }
         assert!(!is_mapping(usize::MAX - 63, 0, 4096), "the end is no address");
+    }
+
+    #[test]
+    fn the_second_choice_of_host_visible_memory_is_the_first_coherent_type() {
+        let [local, visible] = [
+            vk::MemoryPropertyFlags::DEVICE_LOCAL,
+            vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT,
+        ];
+        let mut properties = vk::PhysicalDeviceMemoryProperties {
+            memory_type_count: 4,
+            memory_heap_count: 3,
+            ..Default::default()
+        };
+        let types =
+            [(local, 0), (vk::MemoryPropertyFlags::HOST_VISIBLE, 0), (visible, 1), (visible | local, 2)];
+        for (to, (property_flags, heap_index)) in properties.memory_types.iter_mut().zip(types) {
+            *to = vk::MemoryType { property_flags, heap_index };
+        }
+        for (to, size) in properties.memory_heaps.iter_mut().zip([1 << 34, 1 << 30, 1 << 28]) {
+            to.size = size;
+        }
+        for (bits, heap) in [(0b1111, Some(1 << 30)), (0b1011, Some(1 << 28)), (0b0011, None), (0, None)] {
+            assert_eq!(second_choice_heap(&properties, bits), heap, "{bits:b}");
+        }
     }
 
     proptest! {

@@ -79,7 +79,7 @@ mod tests {
         }
     }
 
-    /// Has the window another size, in which pictures fail this many times.
+    /// Gives the window another size, in which pictures fail this many times.
     fn fail(resize: &mut ResizeDebounce, size: [u32; 2], times: u32, now: Instant) {
         assert_eq!(resize.next(size, now), None);
         for time in 1..=times {
