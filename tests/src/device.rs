@@ -8,7 +8,7 @@ use lvk::ash::{Entry, vk};
 use lvk::{
     Context, ContextDesc, Error, RayQueryRequest, RayTracingPipelineRequest, ValidationMode, ValidationSink,
 };
-use lvk_dev_driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
+use lvk_dev_driver::{DriverError, DriverRequest, is_set, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Its drop fails the test on any message, those of the
 /// context's destruction included.
@@ -259,8 +259,4 @@ fn keep_drivers(library: Option<&Path>) -> Vec<vk::DriverId> {
 #[expect(clippy::panic, reason = "a test without its device has failed")]
 pub(crate) fn unavailable(reason: &str) -> ! {
     panic!("this test needs a Vulkan device: {reason}");
-}
-
-fn is_set(variable: &str) -> bool {
-    std::env::var(variable).is_ok_and(|value| !value.is_empty() && value != "0")
 }

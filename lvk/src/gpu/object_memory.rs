@@ -6,7 +6,7 @@ use gpu_allocator::AllocationError;
 use super::device::Gpu;
 #[cfg(any(test, feature = "test-hooks"))]
 use super::memory::allocator::DeviceMemory;
-use super::memory::allocator::{MemoryKind, ObjectMemory};
+use super::memory::allocator::{MemoryKind, ObjectMemory, first_type};
 use crate::error::{Error, Result, check_limit};
 
 impl Gpu {
@@ -87,9 +87,7 @@ impl Gpu {
 
 /// Returns the first lazily allocated memory type among those in `bits`.
 fn lazy_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
-    let lazy =
-        |kind: &vk::MemoryType| kind.property_flags.contains(vk::MemoryPropertyFlags::LAZILY_ALLOCATED);
-    (0..).zip(types).find(|(index, kind)| bits >> index & 1 == 1 && lazy(kind)).map(|(index, _)| index)
+    first_type(types, bits, vk::MemoryPropertyFlags::LAZILY_ALLOCATED)
 }
 
 /// Returns the error of an allocation of `bytes` bytes for `name`. The allocator's texts hold the driver's errors.

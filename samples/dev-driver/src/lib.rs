@@ -119,7 +119,6 @@ pub fn prepare(request: &DriverRequest) -> Result<Driver, DriverError> {
 /// # Errors
 /// As [`prepare`], unless the test is to be skipped.
 pub fn prepare_unless_skipped(request: &DriverRequest) -> Result<bool, DriverError> {
-    let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
     match prepare(request) {
         Ok(_) => Ok(true),
         Err(error) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
@@ -128,6 +127,11 @@ pub fn prepare_unless_skipped(request: &DriverRequest) -> Result<bool, DriverErr
         }
         Err(error) => Err(error),
     }
+}
+
+/// True if an environment variable has a value other than `0`.
+pub fn is_set(variable: &str) -> bool {
+    std::env::var(variable).is_ok_and(|value| !value.is_empty() && value != "0")
 }
 
 /// Returns the path of SwiftShader's driver manifest (ICD JSON). SwiftShader is a software driver with Vulkan 1.3 and without

@@ -294,10 +294,17 @@ impl DeviceMemory {
 /// device, has failed.
 fn second_choice_heap(properties: &vk::PhysicalDeviceMemoryProperties, type_bits: u32) -> Option<u64> {
     let flags = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-    let mut types = properties.memory_types_as_slice().iter().enumerate();
-    let (_, found) =
-        types.find(|(number, kind)| type_bits & 1 << number != 0 && kind.property_flags.contains(flags))?;
-    properties.memory_heaps_as_slice().get(found.heap_index as usize).map(|heap| heap.size)
+    let types = properties.memory_types_as_slice();
+    let heap = types[first_type(types, type_bits, flags)? as usize].heap_index;
+    properties.memory_heaps_as_slice().get(heap as usize).map(|heap| heap.size)
+}
+
+/// Returns the first memory type among those in `bits` that has these properties.
+pub(crate) fn first_type(types: &[vk::MemoryType], bits: u32, flags: vk::MemoryPropertyFlags) -> Option<u32> {
+    let suits = |(index, kind): &(u32, &vk::MemoryType)| {
+        bits >> index & 1 == 1 && kind.property_flags.contains(flags)
+    };
+    (0..).zip(types).find(suits).map(|(index, _)| index)
 }
 
 /// Allocates memory of the allocator's blocks. If no further block fits on the device or can be mapped, the memory gets an

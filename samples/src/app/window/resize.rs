@@ -98,7 +98,7 @@ mod tests {
         fail(&mut resize, [9, 8], 3, at(0));
         assert_eq!(resize.next([9, 8], at(9)), None, "given up");
         assert_eq!(resize.pictures(), [8, 8]);
-        // A size that failed is tried anew when the window comes back to it.
+        // When the window comes back to a size in which pictures failed, they are tried anew.
         fail(&mut resize, [10, 8], 1, at(10));
         fail(&mut resize, [9, 8], 2, at(20));
         assert_eq!(resize.next([9, 8], at(30)), Some([9, 8]));

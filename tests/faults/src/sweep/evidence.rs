@@ -5,10 +5,6 @@ use super::verdict::RunOutcome;
 use crate::call_log::Call;
 use crate::fault::{Fault, FaultError, PROGRESS, Span};
 
-/// Command that the allocator calls again at once, for a block of another size. That block may also serve objects for which the run
-/// without a fault allocates another one, so that there are no more calls in all.
-const ALLOCATION: &str = "vkAllocateMemory";
-
 /// True if the calls of a run with `fault` show what the library does in place of the calls of `command` that have failed.
 pub(super) fn is_seen(
     instead: Instead,
@@ -21,12 +17,12 @@ pub(super) fn is_seen(
     match instead {
         // How often a program asks depends on the speed of the device.
         Instead::AsksAgain if fault.span == Span::Once => is_followed_by_success(command, &found.calls),
-        Instead::CallsAgain if fault.span == Span::Once => {
-            calls(found) > calls(clean)
-                || (command == ALLOCATION && is_called_again_at_once(command, &found.calls))
+        Instead::CallsAgain if fault.span == Span::Once => calls(found) > calls(clean),
+        Instead::AllocatesAgain if fault.span == Span::Once => {
+            calls(found) > calls(clean) || is_called_again_at_once(command, &found.calls)
         }
         // Where later calls fail too, a second call fails.
-        Instead::CallsAgain | Instead::AsksAgain => {
+        Instead::CallsAgain | Instead::AllocatesAgain | Instead::AsksAgain => {
             count(found, |call| call.command == command && call.fails) > 1
         }
         Instead::BeginsLater => found.unready.is_empty(),
@@ -100,14 +96,16 @@ mod tests {
         let again = |span, found: &str| seen(Instead::CallsAgain, "vkMapMemory", span, found, "vkMapMemory");
         assert!(again(Span::Once, "vkMapMemory! vkMapMemory"));
         assert!(!again(Span::Once, "vkMapMemory!"));
-        let with_two = |command: &str, found: &str| {
+        let with_two = |instead, command: &str, found: &str| {
             let [found, without] = [found, "call call"].map(|text| text.replace("call", command));
-            seen(Instead::CallsAgain, command, Span::Once, &found, &without)
+            seen(instead, command, Span::Once, &found, &without)
         };
-        assert!(with_two(ALLOCATION, "call! call vkCreateBuffer"), "at once");
-        assert!(!with_two(ALLOCATION, "call! vkCreateBuffer call"), "as often, and later");
-        assert!(!with_two(ALLOCATION, "call call"), "none fails");
-        assert!(!with_two("vkCreateBuffer", "call! call vkBindBufferMemory"), "another buffer");
+        let allocated = |found: &str| with_two(Instead::AllocatesAgain, "vkAllocateMemory", found);
+        assert!(allocated("call! call vkCreateBuffer"), "at once");
+        assert!(!allocated("call! vkCreateBuffer call"), "as often, and later");
+        assert!(!allocated("call call"), "none fails");
+        let created = with_two(Instead::CallsAgain, "vkCreateBuffer", "call! call vkBindBufferMemory");
+        assert!(!created, "another buffer");
         for span in [Span::Command, Span::Stays, Span::Unanswered] {
             assert!(again(span, "vkMapMemory! vkMapMemory!"), "{span:?}");
             assert!(!again(span, "vkMapMemory vkMapMemory!"), "{span:?}");

@@ -18,6 +18,9 @@ pub struct Fallback {
 pub enum Instead {
     /// A further call of the command, for the same object or another one that serves as well.
     CallsAgain,
+    /// An allocation of a block of another size, which may also serve objects for which a run without the failure allocates another
+    /// block: so there may be no more calls in all, but one follows at once.
+    AllocatesAgain,
     /// A question about the progress of work that is asked again later.
     AsksAgain,
     /// The command buffer that was to be begun ahead is begun by the next acquisition, or not needed.
@@ -31,7 +34,9 @@ pub enum Instead {
 }
 
 use FaultError::{DeviceLost, DeviceMemory, HostMemory, NoAddress, OutOfDate, SurfaceLost};
-use Instead::{AsksAgain, BeginsLater, CallsAgain, LosesName, RemakesSwapchain, WaitsOtherwise};
+use Instead::{
+    AllocatesAgain, AsksAgain, BeginsLater, CallsAgain, LosesName, RemakesSwapchain, WaitsOtherwise,
+};
 
 const fn fallback(command: &'static str, errors: &'static [FaultError], instead: Instead) -> Fallback {
     Fallback { command, errors, instead }
@@ -43,7 +48,7 @@ pub const FALLBACKS: &[Fallback] = &[
     fallback("vkAllocateCommandBuffers", &[HostMemory, DeviceMemory], BeginsLater),
     fallback("vkResetCommandPool", &[HostMemory, DeviceMemory], BeginsLater),
     fallback("vkBeginCommandBuffer", &[HostMemory, DeviceMemory], BeginsLater),
-    fallback("vkAllocateMemory", &[HostMemory, DeviceMemory], CallsAgain),
+    fallback("vkAllocateMemory", &[HostMemory, DeviceMemory], AllocatesAgain),
     fallback("vkCreateBuffer", &[DeviceMemory], CallsAgain),
     fallback("vkBindBufferMemory", &[DeviceMemory], CallsAgain),
     fallback("vkMapMemory", &[HostMemory, DeviceMemory, NoAddress], CallsAgain),
