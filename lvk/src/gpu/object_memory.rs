@@ -6,7 +6,7 @@ use gpu_allocator::AllocationError;
 use super::device::Gpu;
 #[cfg(any(test, feature = "test-hooks"))]
 use super::memory::allocator::DeviceMemory;
-use super::memory::allocator::{MemoryKind, ObjectMemory, first_type};
+use super::memory::allocator::{MemoryKind, ObjectMemory, first_type, types_of_size};
 use crate::error::{Error, Result, check_limit};
 
 impl Gpu {
@@ -41,13 +41,15 @@ impl Gpu {
     }
 
     /// Allocates lazily allocated memory, which exists only while a render pass needs it. `None` if the
-    /// device has no such memory type.
+    /// device has no such memory type, or none of this size.
     pub(crate) fn allocate_lazy(
         &self,
         name: &str,
         requirements: vk::MemoryRequirements,
     ) -> Result<Option<vk::DeviceMemory>> {
-        let Some(kind) = lazy_type(&self.memory_types(), requirements.memory_type_bits) else {
+        let properties = self.memory_properties();
+        let bits = requirements.memory_type_bits & types_of_size(&properties, requirements.size);
+        let Some(kind) = lazy_type(properties.memory_types_as_slice(), bits) else {
             return Ok(None);
         };
         let info =
@@ -58,11 +60,10 @@ impl Gpu {
             .map_err(Error::allocating(name, requirements.size))
     }
 
-    /// Returns the memory types of the device (`vkGetPhysicalDeviceMemoryProperties`).
-    pub(super) fn memory_types(&self) -> Vec<vk::MemoryType> {
+    /// Returns the memory types and heaps of the device (`vkGetPhysicalDeviceMemoryProperties`).
+    pub(super) fn memory_properties(&self) -> vk::PhysicalDeviceMemoryProperties {
         // SAFETY: the physical device belongs to the instance.
-        let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) };
-        memory.memory_types_as_slice().to_vec()
+        unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) }
     }
 
     /// Returns the number of live `VkDeviceMemory` objects of the allocator and their bytes.

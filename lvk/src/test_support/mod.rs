@@ -12,6 +12,8 @@ pub mod outside_bytes;
 #[cfg(all(feature = "glsl", any(test, feature = "test-hooks")))]
 pub mod outside_pipelines;
 #[cfg(test)]
+pub(crate) mod recording_memory;
+#[cfg(test)]
 pub(crate) mod scattered_bounds;
 #[cfg(feature = "software-ray-query")]
 pub(crate) mod software_ray_query;

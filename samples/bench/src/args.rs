@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Args, Parser, Subcommand};
-use lvk::DeviceProfile;
+use lvk::{BuildFlags, DeviceProfile};
 
 use crate::growth::GrowthArgs;
 use crate::paper::PaperArgs;
@@ -114,12 +114,21 @@ pub(super) struct BuildsArgs {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Vec<u16>,
 
+    /// Builds BLAS that keep indices of shared vertices (`BuildFlags::LOW_MEMORY`); their rays are not traced
+    #[arg(long)]
+    low_memory: bool,
+
     /// Builds by Embree 3 or 4 too; FILE is its library, as libembree3.so.3
     #[arg(long, value_name = "FILE")]
     pub(super) embree: Option<PathBuf>,
 }
 
 impl BuildsArgs {
+    /// Returns the flags of the library's builds.
+    pub(super) fn flags(&self) -> BuildFlags {
+        if self.low_memory { BuildFlags::LOW_MEMORY } else { BuildFlags::FAST_TRACE }
+    }
+
     /// Returns the numbers of threads to measure.
     pub(super) fn threads(&self) -> Vec<usize> {
         if !self.threads.is_empty() {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use lvk::BuildFlags;
 use lvk::test_hooks::{CpuBuild, ObvhsBuild, WideTree, build_by_obvhs, build_on_threads};
 
 use crate::args::{BenchArgs, BuildsArgs};
@@ -45,13 +46,15 @@ pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, Ben
         })
         .collect();
     let embree = args.embree.as_deref().map(Embree::open).transpose()?;
+    let mut embree_tree = None;
     for row in &mut rows {
-        measure_row(&mesh, runs, row);
+        measure_row(&mesh, args.flags(), runs, row);
         if let Some(embree) = &embree {
-            row.by_embree = embree.build(&mesh.positions, &mesh.triangles, row.threads, runs)?;
+            let (builds, tree) = embree.build(&mesh.positions, &mesh.triangles, row.threads, runs)?;
+            row.by_embree = builds;
+            embree_tree = Some(tree);
         }
     }
-    let embree_tree = embree.map(|embree| embree.tree(&mesh.positions, &mesh.triangles)).transpose()?;
     let mut table = table(&mesh, runs, &rows);
     let own = rows.iter().flat_map(|row| &row.builds).find_map(CpuBuild::tree);
     let obvhs = rows.into_iter().find_map(|row| row.tree_of_obvhs);
@@ -84,12 +87,12 @@ fn add_trees(table: &mut Table, mesh: &Mesh, trees: &[(&str, WideTree)], quick: 
     }
 }
 
-fn measure_row(mesh: &Mesh, runs: u32, row: &mut ThreadRow) {
+fn measure_row(mesh: &Mesh, flags: BuildFlags, runs: u32, row: &mut ThreadRow) {
     let (threads, builds) = (row.threads, &mut row.builds);
     let before = restart_peak();
-    build_on_threads(&mesh.positions, &mesh.triangles, threads, 1, |_| {});
+    build_on_threads(&mesh.positions, &mesh.triangles, flags, threads, 1, |_| {});
     row.peak = peak_bytes().saturating_sub(before);
-    build_on_threads(&mesh.positions, &mesh.triangles, threads, runs, |build| builds.push(build));
+    build_on_threads(&mesh.positions, &mesh.triangles, flags, threads, runs, |build| builds.push(build));
     build_by_obvhs(&mesh.positions, &mesh.triangles, threads, runs, |ObvhsBuild { total, tree }| {
         row.others.push(total);
         row.tree_of_obvhs = Some(tree);

@@ -30,7 +30,7 @@ pub(super) struct EmbreeBuild {
     pub(super) medium: Duration,
     /// The same with `RTC_BUILD_QUALITY_HIGH`, which splits triangles.
     pub(super) high: Duration,
-    /// Time of `rtcBuildBVH` with medium quality, whose tree [`Embree::tree`] returns.
+    /// Time of `rtcBuildBVH` with medium quality, whose tree [`Embree::build`] returns.
     pub(super) bvh: Duration,
 }
 
@@ -143,34 +143,28 @@ impl Embree {
         Ok(Self { functions })
     }
 
-    /// Builds the mesh on `threads` threads, `runs` times.
+    /// Builds the mesh on `threads` threads, `runs` times. Returns the times, and the tree of the last `rtcBuildBVH`, with medium quality, eight
+    /// children a node and the costs of the library's trees.
     pub(super) fn build(
         &self,
         positions: &[[f32; 3]],
         triangles: &[[u32; 3]],
         threads: usize,
         runs: u32,
-    ) -> Result<Vec<EmbreeBuild>, EmbreeError> {
+    ) -> Result<(Vec<EmbreeBuild>, WideTree), EmbreeError> {
         let device = Device::new(&self.functions, threads)?;
         // Embree reads 16 bytes of the last vertex.
         let padded = [positions, &[[0.0; 3]]].concat();
         let vertices = &padded[..positions.len()];
-        let once = |_| {
+        let (mut builds, mut last) = (Vec::new(), WideTree::default());
+        for _ in 0..runs {
             let medium = device.commit(vertices, triangles, MEDIUM)?;
             let high = device.commit(vertices, triangles, HIGH)?;
-            let (bvh, _) = device.tree(positions, triangles)?;
-            Ok(EmbreeBuild { medium, high, bvh })
-        };
-        (0..runs).map(once).collect()
-    }
-
-    /// Returns the tree of `rtcBuildBVH` with medium quality, eight children a node and the costs of the library's trees.
-    pub(super) fn tree(
-        &self,
-        positions: &[[f32; 3]],
-        triangles: &[[u32; 3]],
-    ) -> Result<WideTree, EmbreeError> {
-        Ok(Device::new(&self.functions, 0)?.tree(positions, triangles)?.1)
+            let (bvh, tree) = device.tree(positions, triangles)?;
+            builds.push(EmbreeBuild { medium, high, bvh });
+            last = tree;
+        }
+        Ok((builds, last))
     }
 }
 

@@ -171,6 +171,7 @@ fn distance_to([a, b, c]: &[Vec3; 3], ray: &Ray) -> Option<f32> {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test")]
 mod tests {
+    use lvk::BuildFlags;
     use lvk::test_hooks::{build_by_obvhs, build_on_threads};
 
     use super::*;
@@ -181,7 +182,9 @@ mod tests {
     fn rays_hit_what_the_test_of_all_triangles_finds() {
         let mesh = spheres(2_000);
         let mut trees = Vec::new();
-        build_on_threads(&mesh.positions, &mesh.triangles, 1, 1, |build| trees.push(build.tree().unwrap()));
+        build_on_threads(&mesh.positions, &mesh.triangles, BuildFlags::FAST_TRACE, 1, 1, |build| {
+            trees.push(build.tree().unwrap())
+        });
         build_by_obvhs(&mesh.positions, &mesh.triangles, 1, 1, |build| trees.push(build.tree));
         let primary = all_camera_rays(&mesh, [16, 9]);
         let bounced = bounce_rays(&trees[0], &primary);

@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, LeafEncoding, build_blas, build_on_threads, check_structure};
-use lvk::{BlasGeometry, GeometryFlags, GeometryTransform, IndexFormat, Indices, Triangles, VertexFormat};
+use lvk::{
+    BlasGeometry, BuildFlags, GeometryFlags, GeometryTransform, IndexFormat, Indices, Triangles, VertexFormat,
+};
 use lvk_tests::device;
 use lvk_tests::gpu_built::{
     aabb_geometry, build, build_input_buffer, check_and_summarize, check_contents, scattered_triangles,
@@ -300,7 +302,7 @@ fn trees_cost_rays_little_more_than_those_of_the_cpu() {
     let triangles: Vec<[u32; 3]> =
         (0..corners.len() as u32).map(|first| [0, 1, 2].map(|at| first * 3 + at)).collect();
     let mut expected = 0.0;
-    build_on_threads(corners.as_flattened(), &triangles, 2, 1, |of_cpu| {
+    build_on_threads(corners.as_flattened(), &triangles, BuildFlags::FAST_TRACE, 2, 1, |of_cpu| {
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&of_cpu.bytes);
         expected = check_structure(&words, &|_| EMPTY).unwrap().cost;
     });

@@ -233,17 +233,16 @@ impl DeviceMemory {
     pub(crate) fn allocate(
         &mut self,
         name: &str,
-        requirements: vk::MemoryRequirements,
+        mut requirements: vk::MemoryRequirements,
         memory: MemoryKind,
         linear: bool,
     ) -> Allocated<ObjectMemory> {
-        let type_bits = requirements.memory_type_bits;
-        // The allocator compares the size with the heap of its first choice, and not with that of its second.
-        if memory == MemoryKind::HostVisible
-            && second_choice_heap(&self.properties, type_bits).is_some_and(|bytes| requirements.size > bytes)
-        {
+        // The allocator compares the size with the heap of its first choice alone, and asks the driver for any size of its second.
+        let large_enough = types_of_size(&self.properties, requirements.size);
+        if requirements.memory_type_bits & large_enough == 0 && requirements.memory_type_bits != 0 {
             return Err(AllocationError::OutOfMemory);
         }
+        requirements.memory_type_bits &= large_enough;
         if let Some(kind) = SlabClass::from_requirements(&requirements, memory, linear)
             && let Ok(shared) = self.allocate_slot(name, kind, requirements.size)
         {
@@ -290,13 +289,13 @@ impl DeviceMemory {
     }
 }
 
-/// Returns the bytes of the heap from which the allocator takes host-visible memory when its first choice, which is also local to the
-/// device, has failed.
-fn second_choice_heap(properties: &vk::PhysicalDeviceMemoryProperties, type_bits: u32) -> Option<u64> {
-    let flags = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-    let types = properties.memory_types_as_slice();
-    let heap = types[first_type(types, type_bits, flags)? as usize].heap_index;
-    properties.memory_heaps_as_slice().get(heap as usize).map(|heap| heap.size)
+/// Returns the memory types whose heaps have at least `bytes` bytes, one bit for each.
+pub(crate) fn types_of_size(properties: &vk::PhysicalDeviceMemoryProperties, bytes: u64) -> u32 {
+    let heaps = properties.memory_heaps_as_slice();
+    let holds =
+        |kind: &vk::MemoryType| heaps.get(kind.heap_index as usize).is_some_and(|heap| bytes <= heap.size);
+    let types = (0..).zip(properties.memory_types_as_slice());
+    types.map(|(number, kind)| u32::from(holds(kind)) << number).sum()
 }
 
 /// Returns the first memory type among those in `bits` that has these properties.
@@ -355,9 +354,11 @@ fn is_mapping(start: usize, offset: u64, size: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use ash::vk::Handle;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::test_support::recording_memory::{recording_device, take_allocations};
 
     #[test]
     fn the_address_of_a_failed_mapping_is_refused() {
@@ -369,27 +370,29 @@ mod tests {
         assert!(!is_mapping(usize::MAX - 63, 0, 4096), "the end is no address");
     }
 
+    /// The device has 1 GiB for the host, and 4 GiB of its own that the host sees too. Each row has the bytes of a buffer in memory that the
+    /// host sees, whether the device's own memory is full, the allocations that the driver is asked for, each with type and bytes, and
+    /// whether one succeeds.
     #[test]
-    fn the_second_choice_of_host_visible_memory_is_the_first_coherent_type() {
-        let [local, visible] = [
-            vk::MemoryPropertyFlags::DEVICE_LOCAL,
-            vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT,
+    fn no_heap_is_asked_for_more_bytes_than_it_has() {
+        const GIB: u64 = 1 << 30;
+        let rows: [(u64, bool, &[(u32, u64)], bool); 4] = [
+            (2 * GIB, false, &[(1, 2 * GIB)], true),
+            // The first choice, the same as its second, and the same again alone.
+            (2 * GIB, true, &[(1, 2 * GIB); 4], false),
+            (8 * GIB, false, &[], false),
+            (GIB, true, &[(1, GIB), (0, GIB)], true),
         ];
-        let mut properties = vk::PhysicalDeviceMemoryProperties {
-            memory_type_count: 4,
-            memory_heap_count: 3,
-            ..Default::default()
-        };
-        let types =
-            [(local, 0), (vk::MemoryPropertyFlags::HOST_VISIBLE, 0), (visible, 1), (visible | local, 2)];
-        for (to, (property_flags, heap_index)) in properties.memory_types.iter_mut().zip(types) {
-            *to = vk::MemoryType { property_flags, heap_index };
-        }
-        for (to, size) in properties.memory_heaps.iter_mut().zip([1 << 34, 1 << 30, 1 << 28]) {
-            to.size = size;
-        }
-        for (bits, heap) in [(0b1111, Some(1 << 30)), (0b1011, Some(1 << 28)), (0b0011, None), (0, None)] {
-            assert_eq!(second_choice_heap(&properties, bits), heap, "{bits:b}");
+        for (size, own_is_full, expected, succeeds) in rows {
+            let (instance, device) = recording_device([GIB, 4 * GIB], own_is_full);
+            let mut memory = DeviceMemory::new(&instance, &device, vk::PhysicalDevice::from_raw(1)).unwrap();
+            let requirements = vk::MemoryRequirements { size, alignment: 256, memory_type_bits: 0b11 };
+            let made = memory.allocate("a buffer", requirements, MemoryKind::HostVisible, true);
+            assert_eq!(take_allocations(), expected, "{size} bytes");
+            assert_eq!(made.is_ok(), succeeds, "{size} bytes: {:?}", made.err());
+            if let Ok(made) = made {
+                memory.free(made).unwrap();
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use std::os::fd::{AsRawFd, FromRawFd, IntoRawFd, OwnedFd, RawFd};
 
 use ash::vk;
 
-use super::allocator::ObjectMemory;
+use super::allocator::{ObjectMemory, types_of_size};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
@@ -144,8 +144,8 @@ impl Gpu {
         owner: DedicatedTo,
         fd_type: MemoryFdType,
     ) -> Result<ObjectMemory> {
-        let types = self.memory_types();
-        let index = shared_type(&types, requirements.memory_type_bits)
+        let properties = self.memory_properties();
+        let index = shared_type(properties.memory_types_as_slice(), requirements.memory_type_bits)
             .ok_or_else(|| Error::unsupported(format!("memory for '{name}'"), "no memory type suits it"))?;
         let mut export = vk::ExportMemoryAllocateInfo::default().handle_types(fd_type.raw());
         let info = vk::MemoryAllocateInfo::default()
@@ -193,6 +193,10 @@ impl Gpu {
     ) -> Result<ObjectMemory> {
         let (bytes, index) = (info.allocation_size, info.memory_type_index);
         check_limit(name, "memory of one object in bytes", bytes, self.caps.limits.max_allocation_bytes)?;
+        let properties = self.memory_properties();
+        if types_of_size(&properties, bytes) >> index & 1 == 0 {
+            return Err(Error::allocating(name, bytes)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY));
+        }
         let (mut dedicated, mut flags) =
             (owner.info(), vk::MemoryAllocateFlagsInfo::default().flags(owner.flags()));
         let info = info.push_next(&mut dedicated).push_next(&mut flags);
@@ -203,8 +207,8 @@ impl Gpu {
             }
             other => Error::allocating(name, bytes)(other),
         })?;
-        let properties = self.memory_types().get(index as usize).map(|kind| kind.property_flags);
-        let memory = ObjectMemory::unmanaged(raw, bytes, index, properties.unwrap_or_default());
+        let flags = properties.memory_types[index as usize].property_flags;
+        let memory = ObjectMemory::unmanaged(raw, bytes, index, flags);
         self.heap_use.add(&memory);
         self.name(raw, name);
         Ok(memory)

@@ -10,6 +10,7 @@ use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::triangle::Triangle;
 
 use super::wide_tree::WideTree;
+use crate::accel::flags::BuildFlags;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::{GeometryBytes, IndexBytes, TriangleBytes, VertexBytes};
 use crate::format::VertexFormat;
@@ -38,15 +39,16 @@ impl CpuBuild {
     }
 }
 
-/// Builds a BLAS of triangles with vertex indices on `threads` threads, `runs` times. `done` sees each build.
+/// Builds a BLAS of triangles with vertex indices by these flags on `threads` threads, `runs` times. `done` sees each build.
 pub fn build_on_threads(
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
+    flags: BuildFlags,
     threads: usize,
     runs: u32,
     mut done: impl FnMut(CpuBuild) + Send,
 ) {
-    on_new_threads(threads, || (0..runs).for_each(|_| done(build(positions, triangles))));
+    on_new_threads(threads, || (0..runs).for_each(|_| done(build(positions, triangles, flags))));
 }
 
 /// A build of one mesh by a builder of the crate `obvhs`.
@@ -93,8 +95,8 @@ pub fn build_by_obvhs(
     });
 }
 
-fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> CpuBuild {
-    let settings = BvhSettings { low_memory: false, refit: false };
+fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], flags: BuildFlags) -> CpuBuild {
+    let settings = BvhSettings::from_flags(flags);
     let bytes = bytemuck::cast_slice(positions);
     let count = positions.len() as u32;
     let vertices = VertexBytes { bytes, stride: 0, format: VertexFormat::F32x3, count };
@@ -133,7 +135,9 @@ mod tests {
             let (positions, triangles) = scattered(count);
             let mut built = Vec::new();
             for threads in [1, 2, 3, 7] {
-                build_on_threads(&positions, &triangles, threads, 2, |build| built.push(build));
+                build_on_threads(&positions, &triangles, BuildFlags::FAST_TRACE, threads, 2, |build| {
+                    built.push(build)
+                });
             }
             let [first, others @ ..] = &built[..] else { unreachable!("eight builds") };
             let cost = first.tree().unwrap().sah_cost();

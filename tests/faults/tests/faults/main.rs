@@ -42,10 +42,9 @@ fn assert_validated(line: &str) {
     assert!(listens > 0, "{line} runs without the validation layer");
 }
 
-/// True for scenarios whose number of calls differs from run to run, by the order of threads or the time of a window, so that a
-/// few faults are not reached.
+/// True for the scenario whose number of calls differs from run to run, by the order of its threads, so that a few faults are not reached.
 fn varies(line: &str) -> bool {
-    ["threads", "window"].contains(&line)
+    line == "threads"
 }
 
 /// True if the device draws to windows of an X server without a screen. NVIDIA's driver (580.159.04) makes no swapchain there.

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::num::NonZeroU32;
 use std::ptr::NonNull;
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lvk::raw_window_handle::{
     DisplayHandle, HandleError, HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle,
@@ -19,8 +19,12 @@ use x11rb::xcb_ffi::{XCBConnection, load_libxcb};
 
 use crate::{Failure, context};
 
-/// Frames until a colour must be visible.
-const FRAMES: usize = 300;
+/// Frames of a colour that are presented before the window is looked at, so that runs make the same calls.
+const FRAMES: usize = 3;
+/// Times that as many frames are presented at most, until the window shows the colour.
+const MOST_TRIES: usize = 20;
+/// Time that the window has to show the frames of a try: presents come to the screen in their own time.
+const PATIENCE: Duration = Duration::from_secs(2);
 /// Frames without an image, one after the other, until the swapchain is given up.
 const FRAMES_WITHOUT_IMAGE: usize = 20;
 /// Name of the swapchain.
@@ -128,7 +132,7 @@ pub(crate) fn frames_and_resize() -> Result<Vec<u8>, Failure> {
     Ok([first, second].concat())
 }
 
-/// Presents frames until the window shows the colour: presents come to the screen in their own time.
+/// Presents frames until the window shows the colour.
 fn show(
     ctx: &Context,
     swapchain: SwapchainHandle,
@@ -136,28 +140,31 @@ fn show(
     color: [f32; 4],
 ) -> Result<[u8; 3], Failure> {
     let wanted = [color[0], color[1], color[2]].map(|part| (part * 255.0) as u8);
-    let mut frames_without_image = 0;
-    for _ in 0..FRAMES {
-        ctx.next_frame()?;
-        frames_without_image += 1;
-        if let Some(image) = ctx.next_image(swapchain)? {
-            let mut cmd = ctx.acquire_command_buffer()?;
-            let target = [ColorAttachment::clear(image.texture(), color)];
-            drop(cmd.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
-            ctx.present(cmd, image)?;
-            frames_without_image = 0;
-        }
-        if frames_without_image == FRAMES_WITHOUT_IMAGE {
-            return Err(format!(
-                "the swapchain '{SWAPCHAIN}' stays out of date: {FRAMES_WITHOUT_IMAGE} frames have no image"
-            )
-            .into());
-        }
+    for _ in 0..MOST_TRIES {
+        (0..FRAMES).try_for_each(|_| present(ctx, swapchain, color))?;
         ctx.wait_idle()?;
-        if window.pixel()? == wanted {
-            return Ok(wanted);
+        let presented = Instant::now();
+        while presented.elapsed() < PATIENCE {
+            if window.pixel()? == wanted {
+                return Ok(wanted);
+            }
+            std::thread::sleep(Duration::from_millis(5));
         }
-        std::thread::sleep(Duration::from_millis(5));
     }
     Err(format!("the window never shows {wanted:?}").into())
+}
+
+/// Presents a frame of the colour, the next that has an image.
+fn present(ctx: &Context, swapchain: SwapchainHandle, color: [f32; 4]) -> Result<(), Failure> {
+    for _ in 0..FRAMES_WITHOUT_IMAGE {
+        ctx.next_frame()?;
+        let Some(image) = ctx.next_image(swapchain)? else { continue };
+        let mut cmd = ctx.acquire_command_buffer()?;
+        let target = [ColorAttachment::clear(image.texture(), color)];
+        drop(cmd.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
+        ctx.present(cmd, image)?;
+        return Ok(());
+    }
+    Err(format!("the swapchain '{SWAPCHAIN}' stays out of date: {FRAMES_WITHOUT_IMAGE} frames have no image")
+        .into())
 }
