@@ -44,10 +44,10 @@ impl Series {
                 Err(format!("not the same at every sample: {values:?}"))
             }
             Rule::Slope(thousandths) if (last - middle) * 1000 > middle * thousandths => {
-                Err(format!("grows from {middle} to {last}, more than {thousandths} thousandths"))
+                Err(format!("grows from {middle} to {last}, more than {thousandths} thousandths: {values:?}"))
             }
             Rule::Rise(most) if last - middle > most => {
-                Err(format!("grows from {middle} to {last}, by more than {most}"))
+                Err(format!("grows from {middle} to {last}, by more than {most}: {values:?}"))
             }
             _ => Ok(()),
         }

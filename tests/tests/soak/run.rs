@@ -9,7 +9,7 @@ use lvk_tests::device_with;
 use lvk_tests::windows::desktop;
 
 use super::churn::Churn;
-use super::flat::{Rule, Samples, Series};
+use super::flat::{Samples, Series};
 use super::frame::Frames;
 #[cfg(target_os = "linux")]
 use super::presentation::Presentation;
@@ -59,9 +59,6 @@ pub struct Report {
 }
 
 impl Soak {
-    /// Most that the memory of the process grows from the middle third to the last one, in thousandths.
-    const SLOPE: i64 = 20;
-
     /// Runs the frames. `None` as for [`lvk_tests::device`].
     pub fn run(&self) -> Option<Result<Report>> {
         assert!(self.sample_every.is_multiple_of(CYCLE), "samples are taken at the same place of the cycle");
@@ -100,7 +97,6 @@ impl Soak {
         let (mut scene, mut churn, mut frames) = (Scene::new(ctx)?, Churn::new(ctx)?, Frames::default());
         let mut rays = Rays::new(ctx)?;
         let (mut tally, mut samples, start) = (Tally::default(), Samples::default(), Instant::now());
-        let memory = if self.validation { Rule::Reported } else { Rule::Slope(Self::SLOPE) };
         for number in 0..self.frames {
             let sampled = churn.before_frame(ctx, &mut scene, number % CYCLE, &mut tally)?;
             frames.frame(ctx, &mut scene, sampled, number, &mut tally)?;
@@ -118,7 +114,7 @@ impl Soak {
             }
             if (number + 1).is_multiple_of(self.sample_every) {
                 frames.finish(0, &mut tally)?;
-                samples.add(sample(ctx, memory)?);
+                samples.add(sample(ctx, self.validation)?);
                 let (count, seconds) = (samples.count(), start.elapsed().as_secs());
                 eprintln!("sample {count} after {} frames and {seconds} s", number + 1);
             }
