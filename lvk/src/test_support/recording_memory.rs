@@ -87,7 +87,7 @@ unsafe extern "system" fn allocate(
     vk::Result::SUCCESS
 }
 
-/// Maps memory at an address that nothing reads.
+/// Maps memory at an address that nothing reads. It has no provenance, so objects at an offset in it must not be asked for.
 unsafe extern "system" fn map(
     _: vk::Device,
     _: vk::DeviceMemory,

@@ -57,7 +57,7 @@ fn letter(cell: &str) -> &str {
 /// Returns the sweeps and faults that a cell states for a letter, as `[b] (40 sweeps, 34,798 faults)`.
 fn stated(cell: &str) -> Option<(u64, u64)> {
     let (_, counts) = cell.strip_suffix(" faults)")?.split_once('(')?;
-    let (sweeps, faults) = counts.split_once(" sweeps, ")?;
+    let (sweeps, faults) = counts.split_once(" sweeps, ").or_else(|| counts.split_once(" sweep, "))?;
     Some((number(sweeps)?, number(faults)?))
 }
 
@@ -153,7 +153,7 @@ fn sweeps_and_faults_are_counted_by_letter() {
 
 #[test]
 fn a_wrong_count_of_a_letter_is_noticed() {
-    let page = "| rows |\n|---|\n| [b] (2 sweeps, 1,007 faults) |\n| without a letter (1 sweeps, 3 faults) |\n\n\
+    let page = "| rows |\n|---|\n| [b] (2 sweeps, 1,007 faults) |\n| without a letter (1 sweep, 3 faults) |\n\n\
                 | program | faults |\n|---|---|\n| x [b] | 1,000 |\n| y [b], in part | 7 |\n| z | 3 |\n\
                 | all of these | 1,010 |\n";
     assert_eq!(wrong_letters(page), Vec::<String>::new());

@@ -211,6 +211,8 @@ impl DeviceMemory {
         device: &ash::Device,
         physical_device: vk::PhysicalDevice,
     ) -> Result<Self> {
+        // SAFETY: the physical device belongs to the instance.
+        let properties = unsafe { instance.get_physical_device_memory_properties(physical_device) };
         let mut debug_settings = AllocatorDebugSettings::default();
         // The context reports leaks by name.
         debug_settings.log_leaks_on_shutdown = false;
@@ -220,11 +222,9 @@ impl DeviceMemory {
             physical_device,
             debug_settings,
             buffer_device_address: true,
-            allocation_sizes: AllocationSizes::default(),
+            allocation_sizes: block_sizes(&properties),
         })
         .map_err(|error| Error::unsupported("memory allocation", error.to_string()))?;
-        // SAFETY: the physical device belongs to the instance.
-        let properties = unsafe { instance.get_physical_device_memory_properties(physical_device) };
         Ok(Self { allocator, slab_pools: Vec::new(), properties })
     }
 
@@ -233,16 +233,29 @@ impl DeviceMemory {
     pub(crate) fn allocate(
         &mut self,
         name: &str,
-        mut requirements: vk::MemoryRequirements,
+        requirements: vk::MemoryRequirements,
         memory: MemoryKind,
         linear: bool,
     ) -> Allocated<ObjectMemory> {
-        // The allocator compares the size with the heap of its first choice alone, and asks the driver for any size of its second.
-        let large_enough = types_of_size(&self.properties, requirements.size);
-        if requirements.memory_type_bits & large_enough == 0 && requirements.memory_type_bits != 0 {
-            return Err(AllocationError::OutOfMemory);
-        }
-        requirements.memory_type_bits &= large_enough;
+        // The allocator compares the size with the heap of its first choice only. It does not check the heap of its second choice.
+        let memory_type_bits =
+            requirements.memory_type_bits & types_of_size(&self.properties, requirements.size);
+        let is_restricted = memory_type_bits != requirements.memory_type_bits;
+        let requirements = vk::MemoryRequirements { memory_type_bits, ..requirements };
+        self.allocate_of_types(name, requirements, memory, linear).map_err(|error| match error {
+            AllocationError::NoCompatibleMemoryTypeFound if is_restricted => AllocationError::OutOfMemory,
+            other => other,
+        })
+    }
+
+    /// Allocates memory of any of the types that the requirements name.
+    fn allocate_of_types(
+        &mut self,
+        name: &str,
+        requirements: vk::MemoryRequirements,
+        memory: MemoryKind,
+        linear: bool,
+    ) -> Allocated<ObjectMemory> {
         if let Some(kind) = SlabClass::from_requirements(&requirements, memory, linear)
             && let Ok(shared) = self.allocate_slot(name, kind, requirements.size)
         {
@@ -287,6 +300,21 @@ impl DeviceMemory {
     pub(crate) fn blocks(&self) -> (usize, u64) {
         (self.allocator.generate_report().blocks.len(), self.allocator.capacity())
     }
+}
+
+/// Returns the sizes of the allocator's blocks: 256 MiB, 64 MiB of types that the host sees, and no more than the smallest heap of these types.
+/// The allocator makes none below 4 MiB.
+fn block_sizes(properties: &vk::PhysicalDeviceMemoryProperties) -> AllocationSizes {
+    const MIB: u64 = 1 << 20;
+    let (heaps, types) = (properties.memory_heaps_as_slice(), properties.memory_types_as_slice());
+    let [device, host] = [(false, 256 * MIB), (true, 64 * MIB)].map(|(is_seen, most)| {
+        let seen = vk::MemoryPropertyFlags::HOST_VISIBLE;
+        let of_kind = types.iter().filter(|kind| kind.property_flags.contains(seen) == is_seen);
+        let sizes = of_kind.filter_map(|kind| heaps.get(kind.heap_index as usize)).map(|heap| heap.size);
+        let whole = sizes.fold(most, u64::min) / (4 * MIB) * (4 * MIB);
+        whole.max(4 * MIB)
+    });
+    AllocationSizes::new(device, host)
 }
 
 /// Returns the memory types whose heaps have at least `bytes` bytes, one bit for each.
@@ -370,29 +398,57 @@ mod tests {
         assert!(!is_mapping(usize::MAX - 63, 0, 4096), "the end is no address");
     }
 
-    /// The device has 1 GiB for the host, and 4 GiB of its own that the host sees too. Each row has the bytes of a buffer in memory that the
-    /// host sees, whether the device's own memory is full, and whether the buffer gets memory; then the allocations that the driver is asked
-    /// for, each with type and bytes.
+    /// Returns what the driver is asked for, each with type and bytes, where `requests` buffers of `size` bytes are allocated and kept; and
+    /// the error of the last. The first heap is the host's, the second the device's, which may be full.
+    fn asked_for(
+        heaps: [u64; 2],
+        own_is_full: bool,
+        (size, memory): (u64, MemoryKind),
+        requests: usize,
+    ) -> (Vec<(u32, u64)>, Option<AllocationError>) {
+        let (instance, device) = recording_device(heaps, own_is_full);
+        let mut all = DeviceMemory::new(&instance, &device, vk::PhysicalDevice::from_raw(1)).unwrap();
+        let requirements = vk::MemoryRequirements { size, alignment: 256, memory_type_bits: 0b11 };
+        let mut made: Vec<_> =
+            (0..requests).map(|_| all.allocate("a buffer", requirements, memory, true)).collect();
+        let error = made.pop().and_then(|last| last.map(|memory| all.free(memory).unwrap()).err());
+        made.into_iter().flatten().for_each(|memory| all.free(memory).unwrap());
+        (take_allocations(), error)
+    }
+
     #[test]
     fn no_heap_is_asked_for_more_bytes_than_it_has() {
         const GIB: u64 = 1 << 30;
-        let own = [(1, 2 * GIB); 4];
-        for ((size, own_is_full, succeeds), expected) in [
-            ((2 * GIB, false, true), &own[..1]),
+        let (seen, own) = (MemoryKind::HostVisible, MemoryKind::Device);
+        let (host_is_small, own_is_small) = ([GIB, 4 * GIB], [4 * GIB, GIB]);
+        let four = [(1, 2 * GIB); 4];
+        for (heaps, own_is_full, request, expected, is_short) in [
+            (host_is_small, false, (2 * GIB, seen), &four[..1], false),
             // The allocator's two choices are the same, and it tries both for a block and for an allocation of exactly the size.
-            ((2 * GIB, true, false), &own),
-            ((8 * GIB, false, false), &[]),
-            ((GIB, true, true), &[(1, GIB), (0, GIB)]),
+            (host_is_small, true, (2 * GIB, seen), &four, true),
+            (host_is_small, false, (8 * GIB, seen), &[], true),
+            (host_is_small, true, (GIB, seen), &[(1, GIB), (0, GIB)], false),
+            (own_is_small, false, (2 * GIB, seen), &[(0, 2 * GIB)], false),
+            (own_is_small, false, (2 * GIB, own), &[], true),
         ] {
-            let (instance, device) = recording_device([GIB, 4 * GIB], own_is_full);
-            let mut memory = DeviceMemory::new(&instance, &device, vk::PhysicalDevice::from_raw(1)).unwrap();
-            let requirements = vk::MemoryRequirements { size, alignment: 256, memory_type_bits: 0b11 };
-            let made = memory.allocate("a buffer", requirements, MemoryKind::HostVisible, true);
-            assert_eq!(take_allocations(), expected, "{size} bytes");
-            assert_eq!(made.is_ok(), succeeds, "{size} bytes: {:?}", made.err());
-            if let Ok(made) = made {
-                memory.free(made).unwrap();
-            }
+            let (asked, error) = asked_for(heaps, own_is_full, request, 1);
+            assert_eq!(asked, expected, "{request:?} of {heaps:?}");
+            assert_eq!(
+                matches!(error, Some(AllocationError::OutOfMemory)),
+                is_short,
+                "{request:?}: {error:?}"
+            );
+            assert_eq!(error.is_some(), is_short, "{request:?}: {error:?}");
+        }
+    }
+
+    #[test]
+    fn blocks_are_no_larger_than_the_smallest_heap() {
+        const MIB: u64 = 1 << 20;
+        let request = (5 * MIB, MemoryKind::HostVisible);
+        for (host, own, block) in [(4096, 4096, 64), (4096, 30, 28), (30, 4096, 28), (64, 128, 64)] {
+            let (asked, error) = asked_for([host * MIB, own * MIB], false, request, 1);
+            assert_eq!((asked, error.is_none()), (vec![(1, block * MIB)], true), "{host} and {own} MiB");
         }
     }
 

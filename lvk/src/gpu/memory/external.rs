@@ -124,6 +124,13 @@ fn shared_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
     unprotected().find(|(_, kind)| local(kind)).or_else(|| unprotected().next()).map(|(index, _)| index)
 }
 
+/// Returns those of the memory types in `bits` whose heaps have at least `bytes` bytes; all of `bits` if none has, which an allocation then
+/// reports as a shortage.
+fn large_enough(bits: u32, properties: &vk::PhysicalDeviceMemoryProperties, bytes: u64) -> u32 {
+    let large = bits & types_of_size(properties, bytes);
+    if large == 0 { bits } else { large }
+}
+
 impl Gpu {
     /// Fails unless the device shares memory by this type of file descriptor. `what` is the refused operation.
     pub(crate) fn require_memory_fd(
@@ -145,7 +152,8 @@ impl Gpu {
         fd_type: MemoryFdType,
     ) -> Result<ObjectMemory> {
         let properties = self.memory_properties();
-        let index = shared_type(properties.memory_types_as_slice(), requirements.memory_type_bits)
+        let bits = large_enough(requirements.memory_type_bits, &properties, requirements.size);
+        let index = shared_type(properties.memory_types_as_slice(), bits)
             .ok_or_else(|| Error::unsupported(format!("memory for '{name}'"), "no memory type suits it"))?;
         let mut export = vk::ExportMemoryAllocateInfo::default().handle_types(fd_type.raw());
         let info = vk::MemoryAllocateInfo::default()
@@ -172,7 +180,9 @@ impl Gpu {
                 format!("the imported memory has {given} bytes, but {needed} are needed"),
             ));
         }
-        let index = imported_type(&functions, name, requirements.memory_type_bits, &memory)?;
+        let properties = self.memory_properties();
+        let bits = |bits| large_enough(bits, &properties, memory.allocation_bytes);
+        let index = imported_type(&functions, name, requirements.memory_type_bits, bits, &memory)?;
         let mut import =
             vk::ImportMemoryFdInfoKHR::default().handle_type(memory.fd_type.raw()).fd(memory.fd.as_raw_fd());
         let info = vk::MemoryAllocateInfo::default()
@@ -207,8 +217,8 @@ impl Gpu {
             }
             other => Error::allocating(name, bytes)(other),
         })?;
-        let flags = properties.memory_types[index as usize].property_flags;
-        let memory = ObjectMemory::unmanaged(raw, bytes, index, flags);
+        let of_type = properties.memory_types[index as usize].property_flags;
+        let memory = ObjectMemory::unmanaged(raw, bytes, index, of_type);
         self.heap_use.add(&memory);
         self.name(raw, name);
         Ok(memory)
@@ -246,6 +256,7 @@ fn imported_type(
     functions: &ash::khr::external_memory_fd::Device,
     name: &str,
     object_bits: u32,
+    large_enough: impl Fn(u32) -> u32,
     memory: &MemoryFd,
 ) -> Result<u32> {
     let (index, bits) = match memory.fd_type {
@@ -257,7 +268,7 @@ fn imported_type(
                 functions.get_memory_fd_properties(memory.fd_type.raw(), memory.fd.as_raw_fd(), &mut found)
             }
             .map_err(|result| refused_dma_buf(name, result))?;
-            let bits = object_bits & found.memory_type_bits;
+            let bits = large_enough(object_bits & found.memory_type_bits);
             (bits.trailing_zeros(), bits)
         }
     };

@@ -198,7 +198,7 @@ fn encode_leaves<'a>(mesh: &'a Mesh, order: &[u32], quality: BvhSettings) -> Lea
 /// Encodes leaves with vertex indices, in the smallest format that fits.
 fn encode_indexed_leaves(IndexedMesh { triangles, vertices }: IndexedMesh) -> LeavesAndVertices<'static> {
     let list = if LeafKind::with_vertex_indices(vertices.len()) == LeafKind::PackedTriangles {
-        EncodedLeaves::Packed(triangles.iter().map(LeafPacked::encode).collect())
+        EncodedLeaves::Packed(triangles.par_iter().map(LeafPacked::encode).collect())
     } else {
         EncodedLeaves::Indexed(triangles)
     };

@@ -1,10 +1,13 @@
 //! Triangles with vertex indices instead of positions, for BLASes that use little memory.
 
 use std::collections::HashMap;
-use std::hash::BuildHasherDefault;
+use std::hash::{BuildHasher, BuildHasherDefault};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
+use super::build_threads::TASK_LENGTH;
 use super::primitives::Mesh;
 use crate::barrier::IdHasher;
 use crate::software_ray_query::layout::{LeafIndexed, LeafTriangle};
@@ -30,27 +33,59 @@ pub(crate) fn index_mesh(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32])
     {
         return None;
     }
-    let mut places: HashMap<[u32; 3], u32, BuildHasherDefault<IdHasher>> = HashMap::default();
-    let mut vertices = Vec::new();
-    let mut place = |key: [u32; 3], position: Vec3| {
-        *places.entry(key).or_insert_with(|| {
-            vertices.push(position);
-            vertices.len() as u32 - 1
-        })
+    let positions = |number: u32| {
+        let of = &triangles[number as usize];
+        [of.a, of.b, of.c]
     };
-    let leaf = |number: &u32| {
+    let key = |corner: usize| {
+        let (number, corner) = (order[corner / 3], corner % 3);
+        match mesh.vertices.get(number as usize) {
+            Some(named) => [triangles[number as usize].geometry, named[corner], 0],
+            None => positions(number)[corner].to_array().map(f32::to_bits),
+        }
+    };
+    let first = first_of_each_key(3 * order.len(), key);
+    let is_first = |corner: &usize| first[*corner] as usize == *corner;
+    let corners = 0..first.len();
+    let at = |corner: usize| positions(order[corner / 3])[corner % 3];
+    let vertices = corners.clone().into_par_iter().filter(is_first).map(at).collect();
+    // Vertices have the order of their first corners. Only the numbers at first corners are used.
+    let mut vertex_of = Vec::with_capacity(first.len());
+    let mut next = 0;
+    for corner in corners {
+        vertex_of.push(next);
+        next += u32::from(is_first(&corner));
+    }
+    let leaf = |(place, number): (usize, &u32)| {
         let of = &triangles[*number as usize];
-        let named = mesh.vertices.get(*number as usize);
-        let positions = [of.a, of.b, of.c];
-        let corner = |corner: usize| match named {
-            Some(named) => place([of.geometry, named[corner], 0], positions[corner]),
-            None => place(positions[corner].to_array().map(f32::to_bits), positions[corner]),
-        };
         let geometry = if several { of.geometry << 24 } else { 0 };
-        LeafIndexed { vertices: [0, 1, 2].map(corner), primitive: of.primitive | geometry }
+        let vertices = [0, 1, 2].map(|corner| vertex_of[first[3 * place + corner] as usize]);
+        LeafIndexed { vertices, primitive: of.primitive | geometry }
     };
-    let triangles = order.iter().map(leaf).collect();
+    let triangles = order.par_iter().enumerate().map(leaf).collect();
     Some(IndexedMesh { triangles, vertices })
+}
+
+/// Corners with the same key share a vertex.
+type Key = [u32; 3];
+
+/// Returns for each corner the first one with the same key. Corners with equal keys are in one share, and a share is searched in order, so the
+/// result does not depend on the number of threads.
+fn first_of_each_key(count: usize, key: impl Fn(usize) -> Key + Sync) -> Vec<u32> {
+    // Rayon has fewer threads than a `u16` counts.
+    let shares = rayon::current_num_threads().min(count.div_ceil(TASK_LENGTH)).max(1);
+    let hasher = BuildHasherDefault::<IdHasher>::default();
+    let share = |corner| ((hasher.hash_one(key(corner)) >> 32) % shares as u64) as u16;
+    let share_of: Vec<u16> = (0..count).into_par_iter().map(share).collect();
+    let first: Vec<AtomicU32> = bytemuck::zeroed_vec(count);
+    (0..shares).into_par_iter().for_each(|share| {
+        let mut seen: HashMap<Key, u32, BuildHasherDefault<IdHasher>> = HashMap::default();
+        for (corner, _) in share_of.iter().enumerate().filter(|(_, of)| usize::from(**of) == share) {
+            let earliest = *seen.entry(key(corner)).or_insert(corner as u32);
+            first[corner].store(earliest, Ordering::Relaxed);
+        }
+    });
+    first.into_iter().map(AtomicU32::into_inner).collect()
 }
 
 #[cfg(test)]
@@ -59,6 +94,7 @@ mod tests {
 
     use super::*;
     use crate::accel::geometry::GeometryFlags;
+    use crate::software_ray_query::bvh::build_threads::on_new_threads;
     use crate::software_ray_query::bvh::primitives::MeshPrimitives;
 
     /// Triangles of two geometries in turn, each with vertices of its own, some of them at the same position.
@@ -94,6 +130,17 @@ mod tests {
             }
             let order: Vec<u32> = (0..triangles.len() as u32).rev().collect();
             let IndexedMesh { triangles: leaves, vertices } = index_mesh(&mesh, &triangles, &order).unwrap();
+            for threads in [1, 2, 5] {
+                let again = on_new_threads(threads, || index_mesh(&mesh, &triangles, &order)).unwrap();
+                prop_assert_eq!(&again.triangles, &leaves);
+                prop_assert_eq!(&again.vertices, &vertices);
+            }
+            // Vertices have the order in which the leaves name them.
+            let mut highest = 0;
+            for vertex in leaves.iter().flat_map(|leaf| leaf.vertices) {
+                prop_assert!(vertex <= highest);
+                highest = highest.max(vertex + 1);
+            }
             prop_assert_eq!(vertices.len(), if moves { given } else { places });
             for (leaf, of) in leaves.iter().zip(triangles.iter().rev()) {
                 prop_assert_eq!(leaf.vertices.map(|vertex| vertices[vertex as usize]), corners(of));

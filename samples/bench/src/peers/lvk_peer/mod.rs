@@ -80,7 +80,7 @@ impl Peer for SoftwarePeer {
             Row::EmptySubmit | Row::BlasBuilds | Row::TlasBuild | Row::RayQueryFrame => {
                 Box::new(self.peer).prepare(row, work)
             }
-            Row::RayPipelineFrame => Err("its pipelines are `bench queries`".into()),
+            Row::RayPipelineFrame => Err("its pipelines are lowered: `bench lowered`".into()),
             _ => Err("as the column of lvk".into()),
         }
     }
