@@ -41,7 +41,7 @@ impl Gpu {
     }
 
     /// Allocates lazily allocated memory, which exists only while a render pass needs it. `None` if the
-    /// device has no such memory type, or none of this size.
+    /// device has no such memory type, or none whose heap is large enough.
     pub(crate) fn allocate_lazy(
         &self,
         name: &str,

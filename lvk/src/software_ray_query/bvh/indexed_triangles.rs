@@ -1,7 +1,7 @@
 //! Triangles with vertex indices instead of positions, for BLASes that use little memory.
 
 use std::collections::HashMap;
-use std::hash::{BuildHasher, BuildHasherDefault};
+use std::hash::{BuildHasher, BuildHasherDefault, Hasher};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec3;
@@ -9,7 +9,6 @@ use rayon::prelude::*;
 
 use super::build_threads::TASK_LENGTH;
 use super::primitives::Mesh;
-use crate::barrier::IdHasher;
 use crate::software_ray_query::layout::{LeafIndexed, LeafTriangle};
 
 /// Triangles and the vertices that their indices refer to.
@@ -37,14 +36,16 @@ pub(crate) fn index_mesh(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32])
         let of = &triangles[number as usize];
         [of.a, of.b, of.c]
     };
-    let key = |corner: usize| {
-        let (number, corner) = (order[corner / 3], corner % 3);
-        match mesh.vertices.get(number as usize) {
-            Some(named) => [triangles[number as usize].geometry, named[corner], 0],
-            None => positions(number)[corner].to_array().map(f32::to_bits),
+    let keys_of = |number: &u32| {
+        let of = &triangles[*number as usize];
+        match mesh.vertices.get(*number as usize) {
+            Some(named) => named.map(|vertex| Key(of.geometry, vertex, 0)),
+            None => positions(*number).map(|at| Key(at.x.to_bits(), at.y.to_bits(), at.z.to_bits())),
         }
     };
-    let first = first_of_each_key(3 * order.len(), key);
+    let keys: Vec<[Key; 3]> = order.par_iter().map(keys_of).collect();
+    let first = first_of_each_key(keys.as_flattened());
+    drop(keys);
     let is_first = |corner: &usize| first[*corner] as usize == *corner;
     let corners = 0..first.len();
     let at = |corner: usize| positions(order[corner / 3])[corner % 3];
@@ -66,22 +67,44 @@ pub(crate) fn index_mesh(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32])
     Some(IndexedMesh { triangles, vertices })
 }
 
-/// Corners with the same key share a vertex.
-type Key = [u32; 3];
+/// Corners with the same key share a vertex: the position's bits, or the geometry and the number of the vertex.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Key(u32, u32, u32);
+
+/// Hashes the three numbers of a [`Key`] by a multiplication each.
+#[derive(Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.write_u32(u32::from(*byte)));
+    }
+
+    fn write_u32(&mut self, number: u32) {
+        self.0 = (self.0.rotate_left(5) ^ u64::from(number)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+
+    /// The high bits of a product depend on all bits of its factors, and a map looks at the low ones too.
+    fn finish(&self) -> u64 {
+        self.0.rotate_left(26)
+    }
+}
 
 /// Returns for each corner the first one with the same key. Corners with equal keys are in one share, and a share is searched in order, so the
 /// result does not depend on the number of threads.
-fn first_of_each_key(count: usize, key: impl Fn(usize) -> Key + Sync) -> Vec<u32> {
+fn first_of_each_key(keys: &[Key]) -> Vec<u32> {
+    let hasher = BuildHasherDefault::<KeyHasher>::default();
+    let shares = rayon::current_num_threads().min(keys.len().div_ceil(TASK_LENGTH)).max(1);
     // Rayon has fewer threads than a `u16` counts.
-    let shares = rayon::current_num_threads().min(count.div_ceil(TASK_LENGTH)).max(1);
-    let hasher = BuildHasherDefault::<IdHasher>::default();
-    let share = |corner| ((hasher.hash_one(key(corner)) >> 32) % shares as u64) as u16;
-    let share_of: Vec<u16> = (0..count).into_par_iter().map(share).collect();
-    let first: Vec<AtomicU32> = bytemuck::zeroed_vec(count);
+    let share = |key: &Key| ((hasher.hash_one(key) >> 40) % shares as u64) as u16;
+    let share_of: Vec<u16> = keys.par_iter().map(share).collect();
+    let first: Vec<AtomicU32> = bytemuck::zeroed_vec(keys.len());
     (0..shares).into_par_iter().for_each(|share| {
-        let mut seen: HashMap<Key, u32, BuildHasherDefault<IdHasher>> = HashMap::default();
-        for (corner, _) in share_of.iter().enumerate().filter(|(_, of)| usize::from(**of) == share) {
-            let earliest = *seen.entry(key(corner)).or_insert(corner as u32);
+        let mut seen: HashMap<Key, u32, BuildHasherDefault<KeyHasher>> = HashMap::default();
+        for (corner, key) in
+            keys.iter().enumerate().filter(|(corner, _)| usize::from(share_of[*corner]) == share)
+        {
+            let earliest = *seen.entry(*key).or_insert(corner as u32);
             first[corner].store(earliest, Ordering::Relaxed);
         }
     });
@@ -130,11 +153,6 @@ mod tests {
             }
             let order: Vec<u32> = (0..triangles.len() as u32).rev().collect();
             let IndexedMesh { triangles: leaves, vertices } = index_mesh(&mesh, &triangles, &order).unwrap();
-            for threads in [1, 2, 5] {
-                let again = on_new_threads(threads, || index_mesh(&mesh, &triangles, &order)).unwrap();
-                prop_assert_eq!(&again.triangles, &leaves);
-                prop_assert_eq!(&again.vertices, &vertices);
-            }
             // Vertices have the order in which the leaves name them.
             let mut highest = 0;
             for vertex in leaves.iter().flat_map(|leaf| leaf.vertices) {
@@ -146,6 +164,22 @@ mod tests {
                 prop_assert_eq!(leaf.vertices.map(|vertex| vertices[vertex as usize]), corners(of));
                 prop_assert_eq!(leaf.primitive, of.geometry << 24 | of.primitive);
             }
+        }
+    }
+
+    #[test]
+    fn vertices_are_the_same_on_any_number_of_threads() {
+        let vertex = |number: u32| (number.wrapping_mul(0x9e37_79b9) >> 24) as u8;
+        let named = |number: u32| [0, 1, 2].map(|corner| vertex(3 * number + corner));
+        let mesh = mesh(&(0..8 * TASK_LENGTH as u32 / 3).map(named).collect::<Vec<_>>());
+        let MeshPrimitives::Triangles(triangles) = &mesh.primitives else { unreachable!("triangles") };
+        let order: Vec<u32> = (0..triangles.len() as u32).rev().collect();
+        let on = |threads| on_new_threads(threads, || index_mesh(&mesh, triangles, &order)).unwrap();
+        let alone = on(1);
+        assert_eq!(alone.vertices.len(), 2 * 256, "each of two geometries has all vertices");
+        for threads in [2, 5, 8] {
+            let shared = on(threads);
+            assert!(shared.triangles == alone.triangles && shared.vertices == alone.vertices, "{threads}");
         }
     }
 
