@@ -6,7 +6,7 @@ use gpu_allocator::AllocationError;
 use super::device::Gpu;
 #[cfg(any(test, feature = "test-hooks"))]
 use super::memory::allocator::DeviceMemory;
-use super::memory::allocator::{MemoryKind, ObjectMemory, first_type, types_of_size};
+use super::memory::allocator::{MemoryKind, ObjectMemory, types_of_size};
 use crate::error::{Error, Result, check_limit};
 
 impl Gpu {
@@ -88,7 +88,10 @@ impl Gpu {
 
 /// Returns the first lazily allocated memory type among those in `bits`.
 fn lazy_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
-    first_type(types, bits, vk::MemoryPropertyFlags::LAZILY_ALLOCATED)
+    let lazy = vk::MemoryPropertyFlags::LAZILY_ALLOCATED;
+    let suits =
+        |(index, kind): &(u32, &vk::MemoryType)| bits >> index & 1 == 1 && kind.property_flags.contains(lazy);
+    (0..).zip(types).find(suits).map(|(index, _)| index)
 }
 
 /// Returns the error of an allocation of `bytes` bytes for `name`. The allocator's texts hold the driver's errors.

@@ -242,32 +242,17 @@ impl DeviceMemory {
             requirements.memory_type_bits & types_of_size(&self.properties, requirements.size);
         let is_restricted = memory_type_bits != requirements.memory_type_bits;
         let requirements = vk::MemoryRequirements { memory_type_bits, ..requirements };
-        self.allocate_of_types(name, requirements, memory, linear).map_err(|error| match error {
-            AllocationError::NoCompatibleMemoryTypeFound if is_restricted => AllocationError::OutOfMemory,
-            other => other,
-        })
-    }
-
-    /// Allocates memory of any of the types that the requirements name.
-    fn allocate_of_types(
-        &mut self,
-        name: &str,
-        requirements: vk::MemoryRequirements,
-        memory: MemoryKind,
-        linear: bool,
-    ) -> Allocated<ObjectMemory> {
         if let Some(kind) = SlabClass::from_requirements(&requirements, memory, linear)
             && let Ok(shared) = self.allocate_slot(name, kind, requirements.size)
         {
             return Ok(shared);
         }
-        Ok(ObjectMemory::dedicated(allocate_dedicated(
-            &mut self.allocator,
-            name,
-            requirements,
-            memory,
-            linear,
-        )?))
+        match allocate_dedicated(&mut self.allocator, name, requirements, memory, linear) {
+            Err(AllocationError::NoCompatibleMemoryTypeFound) if is_restricted => {
+                Err(AllocationError::OutOfMemory)
+            }
+            made => made.map(ObjectMemory::dedicated),
+        }
     }
 
     /// Allocates a slot of a block.
@@ -324,14 +309,6 @@ pub(crate) fn types_of_size(properties: &vk::PhysicalDeviceMemoryProperties, byt
         |kind: &vk::MemoryType| heaps.get(kind.heap_index as usize).is_some_and(|heap| bytes <= heap.size);
     let types = (0..).zip(properties.memory_types_as_slice());
     types.map(|(number, kind)| u32::from(holds(kind)) << number).sum()
-}
-
-/// Returns the first memory type among those in `bits` that has these properties.
-pub(crate) fn first_type(types: &[vk::MemoryType], bits: u32, flags: vk::MemoryPropertyFlags) -> Option<u32> {
-    let suits = |(index, kind): &(u32, &vk::MemoryType)| {
-        bits >> index & 1 == 1 && kind.property_flags.contains(flags)
-    };
-    (0..).zip(types).find(suits).map(|(index, _)| index)
 }
 
 /// Allocates memory of the allocator's blocks. If no further block fits on the device or can be mapped, the memory gets an

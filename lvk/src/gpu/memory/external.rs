@@ -160,7 +160,7 @@ impl Gpu {
             .allocation_size(requirements.size)
             .memory_type_index(index)
             .push_next(&mut export);
-        self.allocate_dedicated(name, info, owner)
+        self.allocate_dedicated(name, info, owner, &properties)
     }
 
     /// Imports memory for one object. Takes the file descriptor if it succeeds, and closes it otherwise.
@@ -181,15 +181,14 @@ impl Gpu {
             ));
         }
         let properties = self.memory_properties();
-        let bits = |bits| large_enough(bits, &properties, memory.allocation_bytes);
-        let index = imported_type(&functions, name, requirements.memory_type_bits, bits, &memory)?;
+        let index = imported_type(&functions, name, requirements.memory_type_bits, &properties, &memory)?;
         let mut import =
             vk::ImportMemoryFdInfoKHR::default().handle_type(memory.fd_type.raw()).fd(memory.fd.as_raw_fd());
         let info = vk::MemoryAllocateInfo::default()
             .allocation_size(memory.allocation_bytes)
             .memory_type_index(index)
             .push_next(&mut import);
-        let imported = self.allocate_dedicated(name, info, owner)?;
+        let imported = self.allocate_dedicated(name, info, owner, &properties)?;
         // The driver owns the file descriptor now.
         let _ = memory.fd.into_raw_fd();
         Ok(imported)
@@ -200,11 +199,11 @@ impl Gpu {
         name: &str,
         info: vk::MemoryAllocateInfo<'_>,
         owner: DedicatedTo,
+        properties: &vk::PhysicalDeviceMemoryProperties,
     ) -> Result<ObjectMemory> {
         let (bytes, index) = (info.allocation_size, info.memory_type_index);
         check_limit(name, "memory of one object in bytes", bytes, self.caps.limits.max_allocation_bytes)?;
-        let properties = self.memory_properties();
-        if types_of_size(&properties, bytes) >> index & 1 == 0 {
+        if types_of_size(properties, bytes) >> index & 1 == 0 {
             return Err(Error::allocating(name, bytes)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY));
         }
         let (mut dedicated, mut flags) =
@@ -256,7 +255,7 @@ fn imported_type(
     functions: &ash::khr::external_memory_fd::Device,
     name: &str,
     object_bits: u32,
-    large_enough: impl Fn(u32) -> u32,
+    properties: &vk::PhysicalDeviceMemoryProperties,
     memory: &MemoryFd,
 ) -> Result<u32> {
     let (index, bits) = match memory.fd_type {
@@ -268,7 +267,8 @@ fn imported_type(
                 functions.get_memory_fd_properties(memory.fd_type.raw(), memory.fd.as_raw_fd(), &mut found)
             }
             .map_err(|result| refused_dma_buf(name, result))?;
-            let bits = large_enough(object_bits & found.memory_type_bits);
+            let bits =
+                large_enough(object_bits & found.memory_type_bits, properties, memory.allocation_bytes);
             (bits.trailing_zeros(), bits)
         }
     };
