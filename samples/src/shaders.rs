@@ -110,6 +110,8 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "triplanar/triplanar",
     "viewer/albedo",
     "viewer/ambient_occlusion",
+    "viewer/ambient_probe",
+    "viewer/ambient_term",
     "viewer/bsdf",
     "viewer/candidate",
     "viewer/emitters",

@@ -153,6 +153,11 @@ Bsdf bsdfOf(Surface surface, vec3 view) {
     return bsdf;
 }
 
+// The light that a surface scatters over all light that falls on it evenly.
+vec3 reflectanceOf(Bsdf bsdf) {
+    return max(bsdf.diffuse + bsdf.sheen + bsdf.reflected, 1e-3);
+}
+
 // The light of a direction, cosine included, and the density with which it is drawn.
 struct Response {
     vec3 value;

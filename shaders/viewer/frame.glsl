@@ -254,6 +254,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     CellArray cacheCells;
     UpdatingPathArray updatingPaths; // one for each block of pixels
     uvec2 wantedMips; // of each image the finest level that was read; 0 if all levels are resident
+    NumberArray ambientSums; // of ambient_term.glsl
     uint stillCount; // frames since the camera moved
     uint view; // what the picture shows: kViewLight or another of plane.glsl
     uint sceneMoves; // not 0: something is elsewhere than in the frame before
@@ -262,8 +263,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     float emitterPower; // sum of areas of emitters times their weights
     uint cacheBuckets; // of the radiance cache; 0 without one
     float cellShare; // side of its cells over their distance from the eye
-    float ambient; // radiance that surfaces return which no ray looks at
-    float occlusionDistance; // of surfaces that take none of it
+    vec3 lampIrradiance; // that lamps and emitters give to surfaces, in the mean
+    vec3 openIrradiance; // likewise the sky and discs, to surfaces that nothing hides
+    float occlusionDistance; // of surfaces that take no ambient light from each other
+    uint padding;
 };
 
 layout(push_constant, scalar) uniform PushConstants {

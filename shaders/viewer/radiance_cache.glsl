@@ -41,11 +41,6 @@ uint blockOf(uint place) {
     return block.y * ((frame.camera.width + kBlock - 1u) / kBlock) + block.x;
 }
 
-// The light that a surface scatters over all light that falls on it evenly.
-vec3 reflectanceOf(Bsdf bsdf) {
-    return max(bsdf.diffuse + bsdf.sheen + bsdf.reflected, 1e-3);
-}
-
 float cellSide(vec3 position) {
     return frame.cellShare * max(length(position - frame.seen.eye), kNearestCells * frame.seen.nearPlane);
 }

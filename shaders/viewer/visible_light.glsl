@@ -3,6 +3,7 @@
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 
+#include "viewer/ambient_term.glsl"
 #include "viewer/radiance_cache.glsl"
 #include "viewer/visible_surface.glsl"
 
@@ -100,7 +101,7 @@ float rangeOf(Path path) {
 // Light of the sky, or from about the surface that hides it, the less the nearer that is.
 vec3 ambientLight(Path path, Hit hit) {
     bool isSky = hit.instance == kNothing && frame.skyProbability > 0.0;
-    return isSky ? missedLight(path.direction, path.density) : vec3(frame.ambient * min(hit.distance / frame.occlusionDistance, 1.0));
+    return isSky ? missedLight(path.direction, path.density) : ambientRadiance() * min(hit.distance / frame.occlusionDistance, 1.0);
 }
 #else
 bool endsInAmbient(Path path) {

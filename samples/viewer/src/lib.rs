@@ -19,6 +19,7 @@ mod dropped;
 mod gpu;
 mod hybrid;
 mod info;
+mod launch;
 pub mod light;
 pub mod model;
 mod names;

@@ -1,20 +1,13 @@
 //! Paths of all pixels by a ray tracing pipeline, or by a compute shader with ray queries.
 
-use lvk::{
-    BlockLayout, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
-    Dependencies, HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, TextureHandle,
-};
+use lvk::{BufferHandle, CommandBuffer, Context, Dependencies, Holder, TextureHandle};
 use lvk_samples::app::array_buffer::buffer;
-use lvk_samples::hybrid::RayPath;
-use lvk_samples::pipelines::SampleStage;
 
 use crate::config::ViewerConfig;
 use crate::gpu::FrameScene;
-use crate::gpu::layout::{GpuStoredPath, Push, SCENE_LAYOUTS};
-use crate::pipelines::{CANDIDATE, NEAREST_HIT, NEAREST_MISS, SAMPLE};
+use crate::gpu::layout::{GpuStoredPath, Push};
+use crate::launch::{RayLaunch, RayStages};
 
-/// Side of a work group in pixels.
-const GROUP: u32 = 8;
 /// Surfaces that each launch leads its paths on by, before the last, which has all that are left. More launches keep more of a GPU's
 /// invocations at work; on a CPU each costs more.
 const GPU_STEPS: &[u32] = &[1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 4, 4];
@@ -28,16 +21,9 @@ const PATH_BYTES: u64 = size_of::<GpuStoredPath>() as u64;
 /// Bytes before the lists of paths (`kListHead` in `shaders/viewer/path_launch.glsl`).
 const LIST_HEAD_BYTES: u64 = 16;
 
-/// The shaders of paths, either of which is enough.
-pub(crate) struct PathStages {
-    pub(crate) rays: SampleStage,
-    pub(crate) query: SampleStage,
-    pub(crate) debug_name: &'static str,
-}
-
 /// Launches that follow the paths of all pixels, and the paths between them.
 pub(crate) struct PathPass {
-    pipeline: PathPipeline,
+    rays: RayLaunch,
     paths: Holder<BufferHandle>,
     extent: [u32; 2],
     steps: &'static [u32],
@@ -54,11 +40,6 @@ pub(crate) struct PathWork {
     pub(crate) bounces: u32,
 }
 
-enum PathPipeline {
-    Rays(Holder<RayTracingPipelineHandle>),
-    Query(Holder<ComputePipelineHandle>),
-}
-
 /// Addresses of the lists of paths, and of the paths.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PathAddresses {
@@ -67,11 +48,8 @@ pub(crate) struct PathAddresses {
 }
 
 impl PathPass {
-    pub(crate) fn new(ctx: &Context, config: &ViewerConfig, stages: &PathStages) -> lvk::Result<Self> {
-        let pipeline = match config.path {
-            RayPath::Pipeline => PathPipeline::Rays(ray_pipeline(ctx, stages)?),
-            RayPath::Query => PathPipeline::Query(compute(ctx, stages.query, SCENE_LAYOUTS)?),
-        };
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig, stages: &RayStages) -> lvk::Result<Self> {
+        let rays = RayLaunch::new(ctx, config.path, stages)?;
         let [width, height] = config.extent();
         let size_bytes = list_bytes(config.extent()) + PATH_BYTES * u64::from(width) * u64::from(height);
         let paths = buffer(ctx, "paths", size_bytes)?;
@@ -81,7 +59,7 @@ impl PathPass {
             false if config.caches() => GPU_CACHE_STEPS,
             false => GPU_STEPS,
         };
-        Ok(Self { pipeline, paths, extent: config.extent(), steps })
+        Ok(Self { rays, paths, extent: config.extent(), steps })
     }
 
     pub(crate) fn addresses(&self) -> lvk::Result<PathAddresses> {
@@ -106,18 +84,10 @@ impl PathPass {
             ..Dependencies::default()
         };
         cmd.fill_buffer(*self.paths, 0, LIST_HEAD_BYTES, 0)?;
-        match &self.pipeline {
-            PathPipeline::Rays(pipeline) => cmd.bind_ray_tracing_pipeline(**pipeline)?,
-            PathPipeline::Query(pipeline) => cmd.bind_compute_pipeline(**pipeline)?,
-        }
+        self.rays.bind(cmd)?;
         for argument in launches(self.steps, work) {
             cmd.push_constants(&Push { frame: work.frame, argument, _padding: 0 })?;
-            match self.pipeline {
-                PathPipeline::Rays(_) => {
-                    cmd.trace_rays([self.extent[0], self.extent[1], 1], &dependencies)?;
-                }
-                PathPipeline::Query(_) => cmd.dispatch(groups(self.extent), &dependencies)?,
-            }
+            self.rays.record(cmd, self.extent, &dependencies)?;
         }
         Ok(())
     }
@@ -146,43 +116,6 @@ fn steps_of_launches(steps: &[u32], bounces: u32) -> Vec<u32> {
         led < bounces
     };
     steps.iter().copied().take_while(is_before_end).chain([0]).collect()
-}
-
-/// Work groups that cover a picture.
-pub(crate) fn groups([width, height]: [u32; 2]) -> [u32; 3] {
-    [width.div_ceil(GROUP), height.div_ceil(GROUP), 1]
-}
-
-/// A compute pipeline of a stage.
-pub(crate) fn compute(
-    ctx: &Context,
-    stage: SampleStage,
-    layouts: &[BlockLayout],
-) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let module = stage.create(ctx, SAMPLE)?;
-    ctx.create_compute_pipeline(&ComputePipelineDesc {
-        module: Some(*module),
-        layouts,
-        debug_name: stage.name,
-        ..ComputePipelineDesc::default()
-    })
-}
-
-/// A pipeline of the ray generation shader and the hit group of all surfaces.
-fn ray_pipeline(ctx: &Context, stages: &PathStages) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let create = |stage: SampleStage| stage.create(ctx, SAMPLE);
-    let (rays, miss, hit) = (create(stages.rays)?, create(NEAREST_MISS)?, create(NEAREST_HIT)?);
-    let candidate = create(CANDIDATE)?;
-    let group = HitGroup { closest_hit: Some(*hit), any_hit: Some(*candidate), ..HitGroup::default() };
-    ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*rays],
-        miss: &[*miss],
-        hit_groups: &[group],
-        max_recursion: 1,
-        layouts: SCENE_LAYOUTS,
-        debug_name: stages.debug_name,
-        ..RayTracingPipelineDesc::default()
-    })
 }
 
 #[cfg(test)]

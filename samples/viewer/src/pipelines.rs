@@ -1,7 +1,7 @@
 //! The sample's stages and pipelines as data.
 
 use crate::hybrid::{DEPTH_FORMAT, TRIANGLE_FORMAT};
-use crate::path_pass::PathStages;
+use crate::launch::RayStages;
 use lvk_samples::pipelines::{SamplePipeline, SampleStage};
 
 /// Name of the sample, and of its folder of shaders.
@@ -18,19 +18,25 @@ macro_rules! stage {
 }
 
 /// Paths of the path tracer.
-pub(crate) const PATHS: PathStages =
-    PathStages { rays: stage!("path.rgen"), query: stage!("path.comp"), debug_name: "viewer paths" };
+pub(crate) const PATHS: RayStages =
+    RayStages { rays: stage!("path.rgen"), query: stage!("path.comp"), debug_name: "viewer paths" };
 /// Paths of the real-time method.
-pub(crate) const LIGHT: PathStages = PathStages {
+pub(crate) const LIGHT: RayStages = RayStages {
     rays: stage!("visible_light.rgen"),
     query: stage!("visible_light.comp"),
     debug_name: "viewer light",
 };
 /// Light with ambient occlusion, of the real-time method.
-pub(crate) const AMBIENT_OCCLUSION: PathStages = PathStages {
+pub(crate) const AMBIENT_OCCLUSION: RayStages = RayStages {
     rays: stage!("ambient_occlusion.rgen"),
     query: stage!("ambient_occlusion.comp"),
     debug_name: "viewer ambient occlusion",
+};
+/// What the eye has about it, for ambient light.
+pub(crate) const AMBIENT_PROBE: RayStages = RayStages {
+    rays: stage!("ambient_probe.rgen"),
+    query: stage!("ambient_probe.comp"),
+    debug_name: "viewer ambient probe",
 };
 pub(crate) const NEAREST_MISS: SampleStage = stage!("nearest.rmiss");
 pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
@@ -69,6 +75,11 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
             &[AMBIENT_OCCLUSION.rays, NEAREST_MISS, NEAREST_HIT, CANDIDATE],
         ),
         SamplePipeline::new("viewer: ambient occlusion by query", &[AMBIENT_OCCLUSION.query]),
+        SamplePipeline::new(
+            "viewer: ambient probe by pipeline",
+            &[AMBIENT_PROBE.rays, NEAREST_MISS, NEAREST_HIT, CANDIDATE],
+        ),
+        SamplePipeline::new("viewer: ambient probe by query", &[AMBIENT_PROBE.query]),
         SamplePipeline::new("viewer: radiance cache", &[RADIANCE_CACHE]),
         SamplePipeline::new("viewer: means over time", &[TEMPORAL]),
         SamplePipeline::new("viewer: filter", &[FILTER]),

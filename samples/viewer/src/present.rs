@@ -3,7 +3,7 @@
 use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, TextureHandle};
 
 use crate::gpu::layout::{FRAME_LAYOUT, Push};
-use crate::path_pass::{compute, groups};
+use crate::launch::{compute, groups};
 use crate::pipelines::PRESENT;
 
 /// Exposes, maps and encodes sums.

@@ -5,8 +5,8 @@ use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
 use crate::config::{Method, ViewerConfig};
-use crate::gpu::FrameScene;
 use crate::gpu::layout::VisibilityConstants;
+use crate::gpu::{FrameChange, FrameScene};
 use crate::hybrid::{CacheConstants, Hybrid};
 use crate::path_pass::{PathAddresses, PathPass, PathWork};
 use crate::pipelines::PATHS;
@@ -24,6 +24,7 @@ pub(crate) struct Addresses {
     pub(crate) paths: PathAddresses,
     pub(crate) visibility: VisibilityConstants,
     pub(crate) cache: CacheConstants,
+    pub(crate) ambient_sums: u64,
 }
 
 impl Renderer {
@@ -47,11 +48,19 @@ impl Renderer {
                 paths: hybrid.path_addresses()?,
                 visibility: hybrid.visibility()?,
                 cache: hybrid.cache()?,
+                ambient_sums: hybrid.ambient_sums()?,
             },
             Self::PathTrace { paths, sums } => {
                 let (sums, paths) = (sums.address()?, paths.addresses()?);
                 let visibility = VisibilityConstants::NONE;
-                Addresses { sums, planes: sums, paths, visibility, cache: CacheConstants::NONE }
+                Addresses {
+                    sums,
+                    planes: sums,
+                    paths,
+                    visibility,
+                    cache: CacheConstants::NONE,
+                    ambient_sums: 0,
+                }
             }
         })
     }
@@ -72,16 +81,16 @@ impl Renderer {
         }
     }
 
-    /// Records a frame, or samples of the path tracer. `is_first`: the real-time method knows no frame before.
+    /// Records a frame, or samples of the path tracer.
     pub(crate) fn record(
         &self,
         to: &mut Frame<'_>,
         work: PathWork,
         scene: FrameScene<'_>,
-        is_first: bool,
+        change: FrameChange,
     ) -> lvk::Result<()> {
         match self {
-            Self::Hybrid(hybrid) => hybrid.record(to, work, scene, is_first),
+            Self::Hybrid(hybrid) => hybrid.record(to, work, scene, change),
             Self::PathTrace { paths, sums } => {
                 to.pass("paths", |cmd| paths.record(cmd, work, &[**sums], (&[], scene)))
             }

@@ -13,7 +13,7 @@ use lvk_samples::scene::{Camera, GpuCamera};
 use crate::config::{Content, Method, ViewerConfig};
 use crate::dropped::DroppedFile;
 use crate::gpu::layout::{FrameConstants, Push};
-use crate::gpu::{DrawnCounts, DrawnInstances, FrameScene, GpuScene, TextureMemory};
+use crate::gpu::{DrawnCounts, DrawnInstances, FrameChange, FrameScene, GpuScene, TextureMemory};
 use crate::hybrid::cell_share;
 use crate::light::Environment;
 use crate::model::{self, ModelCamera};
@@ -371,6 +371,7 @@ impl Viewer {
             paths: addresses.paths.paths,
             cache: addresses.cache.addresses,
             wanted_mips: self.scene.wanted_mips().map_or(Ok(0), |buffer| self.ctx.buffer_address(buffer))?,
+            ambient_sums: addresses.ambient_sums,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
             scene_moves: u32::from(self.scene.moves()),
@@ -380,6 +381,7 @@ impl Viewer {
             ambient: self.scene.ambient(),
             occlusion_distance: OCCLUSION_SHARE
                 * self.bounds.min.distance(self.bounds.max).max(f32::MIN_POSITIVE),
+            _padding: 0,
         })
     }
 
@@ -399,7 +401,12 @@ impl Viewer {
             wanted_mips: self.scene.wanted_mips(),
         };
         let work = PathWork { frame: constants, samples: count, bounces: self.config.bounces };
-        self.renderer.record(frame, work, scene, self.is_first())?;
+        let change = match self.camera != self.before || self.scene.moves() {
+            _ if self.is_first() => FrameChange::All,
+            true => FrameChange::Place,
+            false => FrameChange::None,
+        };
+        self.renderer.record(frame, work, scene, change)?;
         self.done += count;
         if is_shown {
             let push = Push { frame: constants, argument: self.summed_samples(), _padding: 0 };

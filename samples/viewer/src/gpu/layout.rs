@@ -290,6 +290,14 @@ lvk::shader_struct! {
         pub(crate) emitter_power: f32,
     }
 
+    /// `Frame`: what comes to surfaces, in the mean.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct AmbientConstants {
+        pub(crate) lamp_irradiance: [f32; 3],
+        pub(crate) open_irradiance: [f32; 3],
+    }
+
     /// `Frame`.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
@@ -315,14 +323,16 @@ lvk::shader_struct! {
         pub(crate) paths: u64,
         pub(crate) cache: CacheAddresses,
         pub(crate) wanted_mips: u64,
+        pub(crate) ambient_sums: u64,
         pub(crate) still_count: u32,
         pub(crate) view: u32,
         pub(crate) scene_moves: u32,
         pub(crate) emission: EmissionConstants,
         pub(crate) cache_buckets: u32,
         pub(crate) cell_share: f32,
-        pub(crate) ambient: f32,
+        pub(crate) ambient: AmbientConstants,
         pub(crate) occlusion_distance: f32,
+        pub(crate) _padding: u32,
     }
 
     /// `PushConstants`.

@@ -6,7 +6,7 @@ use glam::{DVec3, Mat4, Vec3};
 use lvk_gltf::{Bounds, LightKind, Model, Pose};
 
 use super::emitters::Emitters;
-use super::layout::{EmissionConstants, GpuLight, light_kind};
+use super::layout::{AmbientConstants, EmissionConstants, GpuLight, light_kind};
 use crate::light::{Environment, Sun, luminance};
 
 /// Lights, discs first, with the probabilities of them and of the sky.
@@ -15,12 +15,9 @@ pub(crate) struct GpuLights {
     pub(crate) disc_count: u32,
     pub(crate) sky_probability: f32,
     pub(crate) emission: EmissionConstants,
-    /// Radiance that surfaces return, in the mean.
-    pub(crate) ambient: f32,
+    pub(crate) ambient: AmbientConstants,
 }
 
-/// The reflectance of surfaces, in the mean, of which nothing is known.
-const MEAN_REFLECTANCE: f64 = 0.5;
 /// The share of samples that a source of light gets at least, over its even share.
 const LEAST_SHARE: f64 = 0.25;
 
@@ -29,7 +26,7 @@ const LEAST_SHARE: f64 = 0.25;
 pub(crate) struct LightSetting {
     sun: Option<Sun>,
     /// Irradiance that the sky gives.
-    sky: f64,
+    sky: DVec3,
     /// Radius of the discs of directional lights, in radians.
     disc_radius: f32,
     bounds: Bounds,
@@ -38,7 +35,7 @@ pub(crate) struct LightSetting {
 impl LightSetting {
     /// A model with directional lights of its own needs no sun.
     pub(crate) fn new(model: &Model, environment: &Environment, disc_radius: f32, bounds: Bounds) -> Self {
-        let sky = luminance(environment.sky.mean()) * PI;
+        let sky = environment.sky.mean() * PI;
         let has_sun = model.lights.iter().any(|light| light.kind == LightKind::Directional);
         Self { sun: environment.sun.filter(|_| !has_sun), sky, disc_radius, bounds }
     }
@@ -65,30 +62,34 @@ impl GpuLights {
         let disc_count = discs.len() as u32;
         let mut lights = [discs, lamps].concat();
         let [emitter_probability, sky_probability] =
-            choose(&mut lights, [emitters.power, setting.sky], &setting.bounds);
+            choose(&mut lights, [emitters.power, luminance(setting.sky)], &setting.bounds);
         let emission = EmissionConstants {
             emitter_count: emitters.triangles.len() as u32,
             emitter_probability,
             emitter_power: emitters.power as f32,
         };
-        let ambient = ambient(&lights, [emitters.power, setting.sky], &setting.bounds) as f32;
+        let ambient = ambient(&lights, emitters.power, setting);
         Self { lights, disc_count, sky_probability, emission, ambient }
     }
 }
 
-/// The radiance that surfaces return, in the mean. Light of lamps and of emitters, which have that radiant intensity, goes from surface to
-/// surface in the box around the scene (the ambient term of Cohen et al., "A Progressive Refinement Approach to Fast Radiosity Image
-/// Generation", 1988). Light from outside, where the sky gives that irradiance, comes to surfaces of all directions and is scattered once.
-fn ambient(lights: &[GpuLight], [emitters, sky]: [f64; 2], bounds: &Bounds) -> f64 {
-    let bright = |light: &GpuLight| luminance(Vec3::from(light.color).as_dvec3());
-    let (discs, lamps): (Vec<_>, Vec<_>) = lights.iter().partition(|light| light.kind == light_kind::DISC);
-    let flux = PI * emitters + lamps.into_iter().map(|lamp| 4.0 * PI * bright(lamp)).sum::<f64>();
-    let extent = (bounds.max - bounds.min).as_dvec3();
+/// The irradiance of surfaces, in the mean. Lamps, and emitters of that radiant intensity, light the sides of the box around the scene. The
+/// sky and discs light surfaces of all directions.
+fn ambient(lights: &[GpuLight], emitters: f64, setting: &LightSetting) -> AmbientConstants {
+    let sum = |is_disc: bool| {
+        let chosen = lights.iter().filter(|light| (light.kind == light_kind::DISC) == is_disc);
+        chosen.map(|light| Vec3::from(light.color).as_dvec3()).sum::<DVec3>()
+    };
+    let flux = PI * (DVec3::splat(emitters) + 4.0 * sum(false));
+    let extent = (setting.bounds.max - setting.bounds.min).as_dvec3();
     let area = 2.0 * extent.dot(DVec3::new(extent.y, extent.z, extent.x));
-    let within = if area > 0.0 { flux / area * MEAN_REFLECTANCE / (1.0 - MEAN_REFLECTANCE) } else { 0.0 };
+    let lamp_irradiance = if area > 0.0 { flux / area } else { DVec3::ZERO };
     // A quarter is the mean of the cosine over all directions, of which half have none.
-    let without = sky + 0.25 * discs.into_iter().map(bright).sum::<f64>();
-    (within + MEAN_REFLECTANCE * without) / PI
+    let open_irradiance = setting.sky + 0.25 * sum(true);
+    AmbientConstants {
+        lamp_irradiance: lamp_irradiance.as_vec3().to_array(),
+        open_irradiance: open_irradiance.as_vec3().to_array(),
+    }
 }
 
 /// Sets the probabilities of lights by the light that they bring about the middle of the scene. Returns those of emitters, which
@@ -186,23 +187,32 @@ mod tests {
     }
 
     #[test]
-    fn ambient_light_is_that_of_a_closed_box_or_half_of_what_comes_from_outside() {
+    fn ambient_light_is_that_of_lamps_in_the_box_and_of_all_that_is_outside() {
+        let setting = |bounds: Bounds, sky: f64| LightSetting {
+            sun: None,
+            sky: DVec3::new(sky, 2.0 * sky, 0.0),
+            disc_radius: 0.0,
+            bounds,
+        };
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-        // Walls of 24 square metres get 12 watts, 0.5 each: they return that much, and its half, and so on.
-        let lamp =
-            GpuLight { kind: light_kind::POINT, color: [3.0 / PI as f32; 3], ..bytemuck::Zeroable::zeroed() };
-        let disc = GpuLight { kind: light_kind::DISC, color: [4.0; 3], ..bytemuck::Zeroable::zeroed() };
-        for (lights, other, radiosity) in [
-            (&[lamp][..], [0.0; 2], 0.5),
-            (&[], [12.0 / PI, 0.0], 0.5),
-            (&[], [0.0, 2.0], 1.0),
-            (&[disc], [0.0; 2], 0.5),
-            (&[], [0.0; 2], 0.0),
+        // Walls of 24 square metres get 12 watts of red light.
+        let lit = |kind, red: f32| GpuLight { kind, color: [red, 0.0, 0.0], ..bytemuck::Zeroable::zeroed() };
+        let lamp = lit(light_kind::POINT, 3.0 / PI as f32);
+        let disc = lit(light_kind::DISC, 4.0);
+        for (lights, emitters, sky, by_lamps, from_outside) in [
+            (&[lamp][..], 0.0, 0.0, [0.5, 0.0, 0.0], [0.0; 3]),
+            (&[], 12.0 / PI, 0.0, [0.5; 3], [0.0; 3]),
+            (&[], 0.0, 2.0, [0.0; 3], [2.0, 4.0, 0.0]),
+            (&[lamp, disc], 12.0 / PI, 2.0, [1.0, 0.5, 0.5], [3.0, 4.0, 0.0]),
+            (&[], 0.0, 0.0, [0.0; 3], [0.0; 3]),
         ] {
-            let found = ambient(lights, other, &bounds);
-            assert!((found - radiosity / PI).abs() < 1e-6, "{found}, not {radiosity} over pi");
+            let found = ambient(lights, emitters, &setting(bounds, sky));
+            let near =
+                |found: [f32; 3], expected: [f32; 3]| Vec3::from(found).abs_diff_eq(expected.into(), 1e-6);
+            assert!(near(found.lamp_irradiance, by_lamps), "{found:?}, not {by_lamps:?}");
+            assert!(near(found.open_irradiance, from_outside), "{found:?}, not {from_outside:?}");
         }
-        let point = Bounds { min: Vec3::ONE, max: Vec3::ONE };
-        assert_eq!(ambient(&[lamp], [1.0, 0.0], &point), 0.0, "no box");
+        let point = setting(Bounds { min: Vec3::ONE, max: Vec3::ONE }, 0.0);
+        assert_eq!(ambient(&[lamp], 1.0, &point).lamp_irradiance, [0.0; 3], "no box");
     }
 }

@@ -40,3 +40,14 @@ impl FrameScene<'_> {
         own.iter().copied().chain(self.wanted_mips).collect()
     }
 }
+
+/// What is another than in the frame before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FrameChange {
+    /// Nothing but the samples.
+    None,
+    /// The place of the camera, or of something in the scene.
+    Place,
+    /// Everything: no frame is known from before.
+    All,
+}

@@ -13,7 +13,7 @@ use super::emitters::Emitters;
 use super::geometry::{GpuMeshes, UploadedMeshes};
 use super::ignored;
 use super::instances::{Draw, MeshKey, SceneInstances};
-use super::layout::{EmissionConstants, GpuTextureSlot, LightConstants, SceneConstants};
+use super::layout::{AmbientConstants, EmissionConstants, GpuTextureSlot, LightConstants, SceneConstants};
 use super::lights::{GpuLights, LightSetting};
 use super::materials::GpuMaterials;
 use super::motion::SceneMotion;
@@ -224,8 +224,8 @@ impl GpuScene {
         self.lights.emission
     }
 
-    /// Radiance that surfaces return, in the mean.
-    pub(crate) fn ambient(&self) -> f32 {
+    /// What comes to surfaces, in the mean.
+    pub(crate) fn ambient(&self) -> AmbientConstants {
         self.lights.ambient
     }
 

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, TextureHandle};
 use lvk_samples::app::array_buffer::buffer;
 
-use crate::path_pass::compute;
+use crate::launch::compute;
 use crate::pipelines::DEPTH_PYRAMID;
 
 /// Levels that a dispatch makes from the one before them.

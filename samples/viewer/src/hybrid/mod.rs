@@ -1,5 +1,6 @@
 //! The real-time method: visible surfaces, a path of light for each, and filters over time and space.
 
+mod ambient_probe;
 mod depth_pyramid;
 mod passes;
 mod radiance_cache;
@@ -10,9 +11,10 @@ use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
 use crate::config::ViewerConfig;
-use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, VisibilityConstants};
+use crate::gpu::{FrameChange, FrameScene};
 use crate::path_pass::{PathAddresses, PathWork};
+use ambient_probe::AmbientProbe;
 use passes::Passes;
 use radiance_cache::RadianceCache;
 pub(crate) use radiance_cache::{CacheConstants, cell_share};
@@ -33,6 +35,8 @@ pub(crate) struct Hybrid {
     passes: Passes,
     /// The light where paths end; they go on to their own end where there is none.
     cache: Option<RadianceCache>,
+    /// What ambient light is found by, where paths end with it.
+    ambient: Option<AmbientProbe>,
     planes: Holder<BufferHandle>,
     extent: [u32; 2],
 }
@@ -50,6 +54,7 @@ impl Hybrid {
             visibility,
             passes: Passes::new(ctx, config)?,
             cache: config.caches().then(|| RadianceCache::new(ctx, config)).transpose()?,
+            ambient: config.occludes_ambient().then(|| AmbientProbe::new(ctx, config.path)).transpose()?,
             planes: buffer(ctx, "planes", size_bytes)?,
             extent,
         })
@@ -90,18 +95,23 @@ impl Hybrid {
         self.cache.as_ref().map_or(Ok(CacheConstants::NONE), RadianceCache::constants)
     }
 
+    /// Address of what the ambient probe has found; 0 without one.
+    pub(crate) fn ambient_sums(&self) -> lvk::Result<u64> {
+        self.ambient.as_ref().map_or(Ok(0), AmbientProbe::address)
+    }
+
     /// Leaves out what others hide, or no longer.
     pub(crate) fn set_occlusion(&mut self, ctx: &Context, is_on: bool) -> lvk::Result<()> {
         self.visibility.as_mut().map_or(Ok(()), |visibility| visibility.set_occlusion(ctx, is_on))
     }
 
-    /// Records a frame. `is_first`: it knows none before.
+    /// Records a frame.
     pub(crate) fn record(
         &self,
         to: &mut Frame<'_>,
         work: PathWork,
         scene: FrameScene<'_>,
-        is_first: bool,
+        change: FrameChange,
     ) -> lvk::Result<()> {
         let frame = work.frame;
         let push = |argument| Push { frame, argument, _padding: 0 };
@@ -114,8 +124,14 @@ impl Hybrid {
         let mut own = vec![planes];
         if let Some(cache) = &self.cache {
             own.push(cache.table());
-            if is_first {
+            if change == FrameChange::All {
                 to.pass("cache", |cmd| cache.clear(cmd))?;
+            }
+        }
+        if let Some(probe) = &self.ambient {
+            own.push(probe.sums());
+            if change != FrameChange::None {
+                to.pass("ambient probe", |cmd| probe.record(cmd, &push(0), scene))?;
             }
         }
         to.pass("light", |cmd| self.passes.light().record(cmd, work, &own, (&visible, scene)))?;

@@ -5,14 +5,15 @@ use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependenc
 use crate::config::{Content, ViewerConfig};
 use crate::gpu::FrameScene;
 use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
-use crate::path_pass::{PathPass, PathStages, compute, groups};
+use crate::launch::{RayStages, compute, groups};
+use crate::path_pass::PathPass;
 use crate::pipelines::{AMBIENT_OCCLUSION, ANTIALIAS, COMPOSITE, FILTER, LIGHT, STEPS, TEMPORAL};
 
 /// Steps of the filter in space.
 const FILTER_STEPS: u32 = 4;
 
 /// The stages of the light of what pixels show.
-fn light_stages(config: &ViewerConfig) -> &'static PathStages {
+fn light_stages(config: &ViewerConfig) -> &'static RayStages {
     if config.occludes_ambient() { &AMBIENT_OCCLUSION } else { &LIGHT }
 }
 

@@ -5,7 +5,7 @@ use lvk_samples::app::array_buffer::buffer;
 
 use crate::config::ViewerConfig;
 use crate::gpu::layout::{CACHE_LAYOUTS, CacheAddresses, GpuCacheCell, GpuUpdatingPath, Push};
-use crate::path_pass::compute;
+use crate::launch::compute;
 use crate::pipelines::RADIANCE_CACHE;
 
 /// Entries of a bucket (`kBucketEntries` in `shaders/viewer/radiance_cache_layout.glsl`).
