@@ -158,6 +158,12 @@ vec3 reflectanceOf(Bsdf bsdf) {
     return max(bsdf.diffuse + bsdf.sheen + bsdf.reflected, 1e-3);
 }
 
+// A direction above the plane of x and y, as likely as its cosine.
+vec3 cosineDirection(vec2 u) {
+    float angle = 2.0 * kPi * u.y;
+    return vec3(sqrt(u.x) * vec2(cos(angle), sin(angle)), sqrt(1.0 - u.x));
+}
+
 // The light of a direction, cosine included, and the density with which it is drawn.
 struct Response {
     vec3 value;
@@ -273,8 +279,7 @@ Drawn drawDirection(Bsdf bsdf, uint lobe, vec2 u, float choice) {
         return Drawn(bsdf.coatBasis * mirrored, mirrored.z > 0.0);
     }
     if (lobe == kDiffuseLobe) {
-        float angle = 2.0 * kPi * u.y;
-        return Drawn(bsdf.basis * vec3(sqrt(u.x) * vec2(cos(angle), sin(angle)), sqrt(1.0 - u.x)), true);
+        return Drawn(bsdf.basis * cosineDirection(u), true);
     }
     if (lobe == kGlassLobe) {
         return drawGlass(bsdf, u, choice);

@@ -264,7 +264,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint cacheBuckets; // of the radiance cache; 0 without one
     float cellShare; // side of its cells over their distance from the eye
     vec3 lampIrradiance; // that lamps and emitters give to surfaces, in the mean
-    vec3 openIrradiance; // likewise the sky and discs, to surfaces that nothing hides
+    vec3 unoccludedIrradiance; // likewise the sky and discs, to surfaces that nothing hides
+    vec3 boxMin; // around the scene
+    vec3 boxMax;
     float occlusionDistance; // of surfaces that take no ambient light from each other
     uint padding;
 };

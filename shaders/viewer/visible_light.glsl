@@ -3,7 +3,6 @@
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 
-#include "viewer/ambient_term.glsl"
 #include "viewer/radiance_cache.glsl"
 #include "viewer/visible_surface.glsl"
 
@@ -78,6 +77,8 @@ FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen
 }
 
 #ifdef AMBIENT_OCCLUSION
+#include "viewer/ambient_term.glsl"
+
 // Surfaces that a pixel shows, in mirrors and through glass too.
 const uint kMostSurfaces = 4u;
 // Bit of Path.bounce of a path whose next ray is its last one.
@@ -98,13 +99,31 @@ float rangeOf(Path path) {
     return endsInAmbient(path) && frame.skyProbability <= 0.0 ? frame.occlusionDistance : kFar;
 }
 
-// Light of the sky, or from about the surface that hides it, the less the nearer that is.
+// True if a path that would end goes on through the surface that it has met.
+bool goesThrough(inout Path path, Hit hit) {
+    if (hit.instance == kNothing || (path.bounce & ~kEndsInAmbient) >= kMostSurfaces) {
+        return false;
+    }
+    uint material = frame.geometries.at[frame.instances.at[hit.instance].firstGeometry + hit.geometry].material;
+    bool isTransparent = frame.materials.at[material].transmission > 0.0;
+    path.bounce &= isTransparent ? ~kEndsInAmbient : ~0u;
+    return isTransparent;
+}
+
+// Light of the sky, or from about the surface that hides it, the less the nearer that is. A ray that has not looked further, for want of
+// a sky, has found neither.
 vec3 ambientLight(Path path, Hit hit) {
-    bool isSky = hit.instance == kNothing && frame.skyProbability > 0.0;
-    return isSky ? missedLight(path.direction, path.density) : ambientRadiance() * min(hit.distance / frame.occlusionDistance, 1.0);
+    if (hit.instance != kNothing) {
+        return ambientRadiance() * min(hit.distance / frame.occlusionDistance, 1.0);
+    }
+    return frame.skyProbability > 0.0 ? missedLight(path.direction, path.density) : (1.0 - skyVisibility()) * ambientRadiance();
 }
 #else
 bool endsInAmbient(Path path) {
+    return false;
+}
+
+bool goesThrough(inout Path path, Hit hit) {
     return false;
 }
 
@@ -142,7 +161,7 @@ bool advance(inout Path path, uint place, inout Random random) {
     } else {
         hit = nextHit(path, rangeOf(path), random);
     }
-    if (endsInAmbient(path)) {
+    if (endsInAmbient(path) && !goesThrough(path, hit)) {
         path.radiance += path.throughput * ambientLight(path, hit);
         return false;
     }

@@ -67,7 +67,7 @@ impl PathPass {
         Ok(PathAddresses { lists, paths: lists + list_bytes(self.extent) })
     }
 
-    /// Records the samples of all pixels, whose shaders write the buffers of the scene and `own`.
+    /// Records the samples of all pixels, whose shaders use the buffers of the scene and `own`.
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,

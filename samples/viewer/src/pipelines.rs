@@ -32,7 +32,7 @@ pub(crate) const AMBIENT_OCCLUSION: RayStages = RayStages {
     query: stage!("ambient_occlusion.comp"),
     debug_name: "viewer ambient occlusion",
 };
-/// What the eye has about it, for ambient light.
+/// The probe of the surfaces around the eye, for ambient light.
 pub(crate) const AMBIENT_PROBE: RayStages = RayStages {
     rays: stage!("ambient_probe.rgen"),
     query: stage!("ambient_probe.comp"),

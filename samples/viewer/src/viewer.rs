@@ -401,10 +401,12 @@ impl Viewer {
             wanted_mips: self.scene.wanted_mips(),
         };
         let work = PathWork { frame: constants, samples: count, bounces: self.config.bounces };
-        let change = match self.camera != self.before || self.scene.moves() {
-            _ if self.is_first() => FrameChange::All,
-            true => FrameChange::Place,
-            false => FrameChange::None,
+        let change = if self.is_first() {
+            FrameChange::All
+        } else if self.camera.eye != self.before.eye || self.scene.moves() {
+            FrameChange::Place
+        } else {
+            FrameChange::None
         };
         self.renderer.record(frame, work, scene, change)?;
         self.done += count;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{Mat3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 use lvk_gltf::{AlphaMode, ColorSpace, Image, Material, Model, Primitive, TexelFormat};
 
 use super::layout::{GpuEmitter, GpuInstance};
@@ -22,6 +22,8 @@ struct Part {
     geometry: u32,
     /// Luminance of its emission, so far as it is known without looking at each texel.
     weight: f32,
+    /// The colour of its emission, whose luminance is 1.
+    color: DVec3,
     /// Two edges of each triangle.
     edges: Vec<[Vec3; 2]>,
 }
@@ -39,18 +41,25 @@ pub(crate) struct Emitters {
     pub(crate) triangles: Vec<GpuEmitter>,
     /// Sum of areas times weights.
     pub(crate) power: f64,
+    /// The same in colours: sum of areas times radiances.
+    pub(crate) light: DVec3,
 }
 
 impl EmissiveMeshes {
     /// Adds a primitive that is the geometry with the number `geometry` of the mesh whose first one has the number `first`.
-    pub(crate) fn add(&mut self, first: u32, geometry: u32, primitive: &Primitive, weight: f32) {
+    pub(crate) fn add(
+        &mut self,
+        (first, geometry): (u32, u32),
+        primitive: &Primitive,
+        (weight, color): (f32, DVec3),
+    ) {
         let at = |index: u32| Vec3::from(primitive.positions.get(index as usize).unwrap_or_default());
         let edges = |corners: &[u32]| {
             let [a, b, c] = [corners[0], corners[1], corners[2]].map(at);
             [b - a, c - a]
         };
         let edges = primitive.indices.chunks_exact(3).map(edges).collect();
-        self.meshes.entry(first).or_default().push(Part { geometry, weight, edges });
+        self.meshes.entry(first).or_default().push(Part { geometry, weight, color, edges });
     }
 
     /// True if nothing glows.
@@ -60,7 +69,7 @@ impl EmissiveMeshes {
 
     /// The triangles of these instances, each chosen by its area and its weight.
     pub(crate) fn emitters(&self, instances: &[GpuInstance]) -> Emitters {
-        let mut all = Vec::new();
+        let (mut all, mut light) = (Vec::new(), DVec3::ZERO);
         for (instance, placed) in (0..).zip(instances) {
             let matrix = Mat3::from_cols_array_2d(
                 &[0, 1, 2].map(|column| [0, 4, 8].map(|row| placed.rows[row + column])),
@@ -70,6 +79,7 @@ impl EmissiveMeshes {
                     let area = 0.5 * (matrix * *u).as_dvec3().cross((matrix * *v).as_dvec3()).length();
                     let share = area * f64::from(part.weight);
                     if share > 0.0 && share.is_finite() {
+                        light += share * part.color;
                         all.push((
                             GpuEmitter { instance, geometry: part.geometry, primitive, chance: 0.0 },
                             share,
@@ -87,7 +97,7 @@ impl EmissiveMeshes {
             sum += share;
             GpuEmitter { chance: (sum / power) as f32, ..emitter }
         });
-        Emitters { triangles: triangles.collect(), power }
+        Emitters { triangles: triangles.collect(), power, light }
     }
 }
 
@@ -100,6 +110,13 @@ pub(crate) fn emission_weight(material: &Material, model: &Model) -> f32 {
     let mean = texture.map_or(1.0, |image| mean_luminance(image).max(1e-3));
     let weight = luminance(emission) * mean;
     if is_solid && weight.is_finite() { weight.max(0.0) as f32 } else { 0.0 }
+}
+
+/// The colour of what a material emits, with a luminance of 1. That of its texture is left out.
+pub(crate) fn emission_color(material: &Material) -> DVec3 {
+    let emission = Vec3::from(material.emissive).as_dvec3();
+    let bright = luminance(emission);
+    if bright > 0.0 { emission / bright } else { DVec3::ONE }
 }
 
 fn mean_luminance(image: &Image) -> f64 {
@@ -122,7 +139,7 @@ fn mean_luminance(image: &Image) -> f64 {
     };
     let texels = level.bytes.chunks_exact(4).step_by(step);
     let (count, sum) = texels.fold((0_u32, 0.0), |(count, sum), texel| {
-        let color = glam::DVec3::new(linear(texel[0]), linear(texel[1]), linear(texel[2]));
+        let color = DVec3::new(linear(texel[0]), linear(texel[1]), linear(texel[2]));
         (count + 1, sum + luminance(color))
     });
     if count > 0 { sum / f64::from(count) } else { UNKNOWN_MEAN }
@@ -144,8 +161,9 @@ mod tests {
     #[test]
     fn triangles_are_chosen_by_area_in_the_world_and_luminance() {
         let mut meshes = EmissiveMeshes::default();
-        meshes.add(4, 0, &triangle(1.0), 3.0);
-        meshes.add(4, 2, &triangle(2.0), 1.0);
+        let (red, white) = (DVec3::new(4.0, 0.0, 0.0), DVec3::ONE);
+        meshes.add((4, 0), &triangle(1.0), (3.0, red));
+        meshes.add((4, 2), &triangle(2.0), (1.0, white));
         let instance = |first_geometry, scale: f32| GpuInstance {
             rows: [scale, 0.0, 0.0, 9.0, 0.0, scale, 0.0, 9.0, 0.0, 0.0, scale, 9.0],
             normal_columns: [0.0; 9],
@@ -154,6 +172,7 @@ mod tests {
         let emitters = meshes.emitters(&[instance(4, 1.0), instance(0, 1.0), instance(4, 2.0)]);
         // Areas of 0.5 and 2 weigh 1.5 and 2; in the larger instance four times as much.
         assert!((emitters.power - 17.5).abs() < 1e-6);
+        assert!(emitters.light.abs_diff_eq(7.5 * red + 10.0 * white, 1e-6), "{}", emitters.light);
         let found: Vec<_> =
             emitters.triangles.iter().map(|one| (one.instance, one.geometry, one.chance * 17.5)).collect();
         assert_eq!(found, [(0, 0, 1.5), (0, 2, 3.5), (2, 0, 9.5), (2, 2, 17.5)]);
@@ -165,7 +184,11 @@ mod tests {
         let model = Model::default();
         let glowing = Material { emissive: [1.0, 0.0, 0.0], emissive_strength: 10.0, ..Material::default() };
         assert!((emission_weight(&glowing, &model) - 2.126).abs() < 1e-3);
+        assert!(
+            (luminance(emission_color(&glowing)) - 1.0).abs() < 1e-9 && emission_color(&glowing).y == 0.0
+        );
         assert_eq!(emission_weight(&Material::default(), &model), 0.0);
+        assert_eq!(emission_color(&Material::default()), DVec3::ONE);
         let holes = Material { alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..glowing };
         assert_eq!(emission_weight(&holes, &model), 0.0);
     }

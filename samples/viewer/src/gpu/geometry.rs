@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, Context,
     GeometryFlags, Holder, IndexFormat, Indices, Triangles, VertexFormat,
@@ -10,7 +10,7 @@ use lvk::{
 use lvk_gltf::{AlphaMode, Bounds, Material, Model, Pose, Primitive};
 
 use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
-use super::emitters::{EmissiveMeshes, emission_weight};
+use super::emitters::{EmissiveMeshes, emission_color, emission_weight};
 use super::instances::MeshKey;
 use super::layout::{GpuAttributes, GpuGeometry, QUANTISED};
 use super::vertices::{PackedPositions, attributes};
@@ -230,7 +230,10 @@ impl MeshWriter<'_> {
             let Some(node) = key.deformed_by else {
                 self.buffers.write(self.ctx, part, primitive)?;
                 if part.emission_weight > 0.0 {
-                    self.emissive.add(first as u32, geometry, primitive, part.emission_weight);
+                    let material = primitive.material.and_then(|number| model.materials.get(number));
+                    let color = material.map_or(DVec3::ONE, emission_color);
+                    let emission = (part.emission_weight, color);
+                    self.emissive.add((first as u32, geometry), primitive, emission);
                 }
                 let around = Bounds::around(primitive.positions.iter().map(Vec3::from));
                 bounds = bounds.into_iter().chain(around).reduce(Bounds::union);

@@ -290,12 +290,14 @@ lvk::shader_struct! {
         pub(crate) emitter_power: f32,
     }
 
-    /// `Frame`: what comes to surfaces, in the mean.
+    /// `Frame`: the ambient term.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct AmbientConstants {
         pub(crate) lamp_irradiance: [f32; 3],
-        pub(crate) open_irradiance: [f32; 3],
+        pub(crate) unoccluded_irradiance: [f32; 3],
+        pub(crate) box_min: [f32; 3],
+        pub(crate) box_max: [f32; 3],
     }
 
     /// `Frame`.

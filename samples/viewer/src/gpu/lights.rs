@@ -68,28 +68,35 @@ impl GpuLights {
             emitter_probability,
             emitter_power: emitters.power as f32,
         };
-        let ambient = ambient(&lights, emitters.power, setting);
+        let ambient = ambient(&lights, emitters.light, setting);
         Self { lights, disc_count, sky_probability, emission, ambient }
     }
 }
 
-/// The irradiance of surfaces, in the mean. Lamps, and emitters of that radiant intensity, light the sides of the box around the scene. The
-/// sky and discs light surfaces of all directions.
-fn ambient(lights: &[GpuLight], emitters: f64, setting: &LightSetting) -> AmbientConstants {
-    let sum = |is_disc: bool| {
-        let chosen = lights.iter().filter(|light| (light.kind == light_kind::DISC) == is_disc);
-        chosen.map(|light| Vec3::from(light.color).as_dvec3()).sum::<DVec3>()
-    };
-    let flux = PI * (DVec3::splat(emitters) + 4.0 * sum(false));
+/// The irradiance of surfaces, in the mean. Lamps, and emitters whose areas times radiances are `emitters`, light the sides of the box around
+/// the scene. The sky and discs light surfaces of all directions.
+fn ambient(lights: &[GpuLight], emitters: DVec3, setting: &LightSetting) -> AmbientConstants {
+    let color = |light: &GpuLight| Vec3::from(light.color).as_dvec3();
+    let (discs, lamps): (Vec<_>, Vec<_>) = lights.iter().partition(|light| light.kind == light_kind::DISC);
+    let flux = PI * emitters + lamps.iter().map(|lamp| solid_angle(lamp) * color(lamp)).sum::<DVec3>();
     let extent = (setting.bounds.max - setting.bounds.min).as_dvec3();
     let area = 2.0 * extent.dot(DVec3::new(extent.y, extent.z, extent.x));
     let lamp_irradiance = if area > 0.0 { flux / area } else { DVec3::ZERO };
     // A quarter is the mean of the cosine over all directions, of which half have none.
-    let open_irradiance = setting.sky + 0.25 * sum(true);
+    let unoccluded_irradiance = setting.sky + 0.25 * discs.iter().map(|disc| color(disc)).sum::<DVec3>();
     AmbientConstants {
         lamp_irradiance: lamp_irradiance.as_vec3().to_array(),
-        open_irradiance: open_irradiance.as_vec3().to_array(),
+        unoccluded_irradiance: unoccluded_irradiance.as_vec3().to_array(),
+        box_min: setting.bounds.min.to_array(),
+        box_max: setting.bounds.max.to_array(),
     }
+}
+
+/// The flux of a lamp over its radiant intensity in the middle: of a spot, the integral of `lampIrradiance` of the shaders over its cone.
+fn solid_angle(lamp: &GpuLight) -> f64 {
+    let (outer, inner) = (f64::from(lamp.cone), f64::from(lamp.cos_inner));
+    let share = if lamp.kind == light_kind::SPOT { 1.0 - inner + (inner - outer) / 3.0 } else { 2.0 };
+    2.0 * PI * share
 }
 
 /// Sets the probabilities of lights by the light that they bring about the middle of the scene. Returns those of emitters, which
@@ -199,20 +206,26 @@ mod tests {
         let lit = |kind, red: f32| GpuLight { kind, color: [red, 0.0, 0.0], ..bytemuck::Zeroable::zeroed() };
         let lamp = lit(light_kind::POINT, 3.0 / PI as f32);
         let disc = lit(light_kind::DISC, 4.0);
+        // The half space has half of the lamp's light where the cone is sharp, and a third of the half where it begins in the middle.
+        let sharp = GpuLight { kind: light_kind::SPOT, ..lamp };
+        let soft = GpuLight { cos_inner: 1.0, ..sharp };
+        let green = DVec3::new(0.0, 12.0 / PI, 0.0);
         for (lights, emitters, sky, by_lamps, from_outside) in [
-            (&[lamp][..], 0.0, 0.0, [0.5, 0.0, 0.0], [0.0; 3]),
-            (&[], 12.0 / PI, 0.0, [0.5; 3], [0.0; 3]),
-            (&[], 0.0, 2.0, [0.0; 3], [2.0, 4.0, 0.0]),
-            (&[lamp, disc], 12.0 / PI, 2.0, [1.0, 0.5, 0.5], [3.0, 4.0, 0.0]),
-            (&[], 0.0, 0.0, [0.0; 3], [0.0; 3]),
+            (&[lamp][..], DVec3::ZERO, 0.0, [0.5, 0.0, 0.0], [0.0; 3]),
+            (&[sharp], DVec3::ZERO, 0.0, [0.25, 0.0, 0.0], [0.0; 3]),
+            (&[soft], DVec3::ZERO, 0.0, [0.25 / 3.0, 0.0, 0.0], [0.0; 3]),
+            (&[], green, 0.0, [0.0, 0.5, 0.0], [0.0; 3]),
+            (&[], DVec3::ZERO, 2.0, [0.0; 3], [2.0, 4.0, 0.0]),
+            (&[lamp, disc], green, 2.0, [0.5, 0.5, 0.0], [3.0, 4.0, 0.0]),
+            (&[], DVec3::ZERO, 0.0, [0.0; 3], [0.0; 3]),
         ] {
             let found = ambient(lights, emitters, &setting(bounds, sky));
             let near =
                 |found: [f32; 3], expected: [f32; 3]| Vec3::from(found).abs_diff_eq(expected.into(), 1e-6);
             assert!(near(found.lamp_irradiance, by_lamps), "{found:?}, not {by_lamps:?}");
-            assert!(near(found.open_irradiance, from_outside), "{found:?}, not {from_outside:?}");
+            assert!(near(found.unoccluded_irradiance, from_outside), "{found:?}, not {from_outside:?}");
         }
         let point = setting(Bounds { min: Vec3::ONE, max: Vec3::ONE }, 0.0);
-        assert_eq!(ambient(&[lamp], 1.0, &point).lamp_irradiance, [0.0; 3], "no box");
+        assert_eq!(ambient(&[lamp], green, &point).lamp_irradiance, [0.0; 3], "no box");
     }
 }

@@ -41,12 +41,12 @@ impl FrameScene<'_> {
     }
 }
 
-/// What is another than in the frame before.
+/// What differs from the frame before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FrameChange {
-    /// Nothing but the samples.
+    /// Nothing that the eye or the scene depends on: the samples, the direction of the camera.
     None,
-    /// The place of the camera, or of something in the scene.
+    /// The place of the eye, or of something in the scene.
     Place,
     /// Everything: no frame is known from before.
     All,

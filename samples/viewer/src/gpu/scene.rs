@@ -224,7 +224,7 @@ impl GpuScene {
         self.lights.emission
     }
 
-    /// What comes to surfaces, in the mean.
+    /// What the ambient term depends on beside the surfaces.
     pub(crate) fn ambient(&self) -> AmbientConstants {
         self.lights.ambient
     }

@@ -1,4 +1,4 @@
-//! The probe of the surfaces around the eye: what they reflect, and how much of the sky they see. Ambient light depends on it.
+//! The probe of the surfaces around the eye: what they reflect, and how much of the sky they see. The ambient term depends on both.
 
 use lvk::{BufferHandle, CommandBuffer, Context, Dependencies, Holder};
 use lvk_samples::app::array_buffer::buffer;
@@ -9,7 +9,7 @@ use crate::gpu::layout::Push;
 use crate::launch::RayLaunch;
 use crate::pipelines::AMBIENT_PROBE;
 
-/// Invocations along each side of the launch (`kProbeSide` in `shaders/viewer/ambient_probe.glsl`).
+/// Invocations along each side of the launch.
 const SIDE: u32 = 64;
 /// Bytes of the sums of `shaders/viewer/ambient_term.glsl`.
 const SUM_BYTES: u64 = 5 * 4;
@@ -38,16 +38,16 @@ impl AmbientProbe {
         self.sums.address()
     }
 
-    /// Records that the sums begin anew.
+    /// Records the rays of the probe. `frame`: address of the frame's constants.
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,
-        push: &Push,
+        frame: u64,
         scene: FrameScene<'_>,
     ) -> lvk::Result<()> {
         cmd.fill_buffer(*self.sums, 0, SUM_BYTES, 0)?;
         self.rays.bind(cmd)?;
-        cmd.push_constants(push)?;
+        cmd.push_constants(&Push { frame, argument: SIDE, _padding: 0 })?;
         let dependencies = Dependencies {
             buffers: &scene.buffers(&[*self.sums]),
             read_buffers: scene.written,

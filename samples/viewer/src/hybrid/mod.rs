@@ -35,7 +35,7 @@ pub(crate) struct Hybrid {
     passes: Passes,
     /// The light where paths end; they go on to their own end where there is none.
     cache: Option<RadianceCache>,
-    /// What ambient light is found by, where paths end with it.
+    /// The probe for ambient light, where paths end with that.
     ambient: Option<AmbientProbe>,
     planes: Holder<BufferHandle>,
     extent: [u32; 2],
@@ -131,7 +131,7 @@ impl Hybrid {
         if let Some(probe) = &self.ambient {
             own.push(probe.sums());
             if change != FrameChange::None {
-                to.pass("ambient probe", |cmd| probe.record(cmd, &push(0), scene))?;
+                to.pass("ambient probe", |cmd| probe.record(cmd, frame, scene))?;
             }
         }
         to.pass("light", |cmd| self.passes.light().record(cmd, work, &own, (&visible, scene)))?;
