@@ -289,6 +289,7 @@ fn the_archives_make_a_street() {
 }
 
 #[test]
+#[ignore = "a minute, of the check swiftshader of .ci/slow"]
 fn a_driver_without_ray_tracing_renders_the_street() {
     assert_swiftshader_matches(
         a_driver_without_ray_tracing_renders_the_street,

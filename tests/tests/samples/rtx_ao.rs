@@ -229,6 +229,7 @@ fn few_passes_render_the_same_but_for_noise_and_nothing_else_does() {
 
 /// Rays take SwiftShader seconds for each pass.
 #[test]
+#[ignore = "a minute, of the check swiftshader of .ci/slow"]
 fn a_driver_without_ray_tracing_renders_the_town() {
     on_swiftshader(a_driver_without_ray_tracing_renders_the_town, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };

@@ -87,6 +87,7 @@ fn no_deeper_than_the_device_can() {
 }
 
 #[test]
+#[ignore = "a minute, of the check swiftshader of .ci/slow"]
 fn a_driver_without_ray_tracing_renders_the_obj_scene() {
     assert_swiftshader_matches(
         a_driver_without_ray_tracing_renders_the_obj_scene,

@@ -68,6 +68,7 @@ fn the_waves_look_as_they_always_did() {
 }
 
 #[test]
+#[ignore = "a minute, of the check swiftshader of .ci/slow"]
 fn a_driver_without_ray_tracing_renders_the_waves() {
     assert_swiftshader_matches(
         a_driver_without_ray_tracing_renders_the_waves,

@@ -223,6 +223,7 @@ fn devices_without_counts_pad_their_draws_and_refuse_to_count() {
 }
 
 #[test]
+#[ignore = "a minute, of the check swiftshader of .ci/slow"]
 fn a_driver_without_ray_tracing_and_counts_renders_the_atrium() {
     on_swiftshader(a_driver_without_ray_tracing_and_counts_renders_the_atrium, || {
         let Some(ctx) = device() else { return };

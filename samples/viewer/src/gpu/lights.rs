@@ -76,14 +76,15 @@ impl GpuLights {
 /// The irradiance of surfaces, in the mean. Lamps, and emitters whose areas times radiances are `emitters`, light the sides of the box around
 /// the scene. The sky and discs light surfaces of all directions.
 fn ambient(lights: &[GpuLight], emitters: DVec3, setting: &LightSetting) -> AmbientConstants {
+    let (discs, lamps): (Vec<&GpuLight>, Vec<_>) =
+        lights.iter().partition(|light| light.kind == light_kind::DISC);
     let color = |light: &GpuLight| Vec3::from(light.color).as_dvec3();
-    let (discs, lamps): (Vec<_>, Vec<_>) = lights.iter().partition(|light| light.kind == light_kind::DISC);
     let flux = PI * emitters + lamps.iter().map(|lamp| solid_angle(lamp) * color(lamp)).sum::<DVec3>();
     let extent = (setting.bounds.max - setting.bounds.min).as_dvec3();
     let area = 2.0 * extent.dot(DVec3::new(extent.y, extent.z, extent.x));
     let lamp_irradiance = if area > 0.0 { flux / area } else { DVec3::ZERO };
     // A quarter is the mean of the cosine over all directions, of which half have none.
-    let unoccluded_irradiance = setting.sky + 0.25 * discs.iter().map(|disc| color(disc)).sum::<DVec3>();
+    let unoccluded_irradiance = setting.sky + 0.25 * discs.into_iter().map(color).sum::<DVec3>();
     AmbientConstants {
         lamp_irradiance: lamp_irradiance.as_vec3().to_array(),
         unoccluded_irradiance: unoccluded_irradiance.as_vec3().to_array(),
