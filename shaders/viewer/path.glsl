@@ -106,6 +106,9 @@ float emissionShare(Path path, Hit hit, Surface surface) {
         return 1.0;
     }
     float weight = frame.geometries.at[frame.instances.at[hit.instance].firstGeometry + hit.geometry].emissionWeight;
+    if (weight > 0.0 && path.density < LEAST_DENSITY) {
+        return 0.0;
+    }
     vec3 way = surface.position - path.from;
     float density = emitterDensity(weight, length(way), abs(dot(surface.geometricNormal, path.direction)));
     return powerShare(path.density, density);

@@ -99,19 +99,21 @@ float rangeOf(Path path) {
     return endsInAmbient(path) && frame.skyProbability <= 0.0 ? frame.occlusionDistance : kFar;
 }
 
-// True if a path that would end goes on through the surface that it has met.
+// True if a path that would end has met a material that lets light through. It does not end then.
 bool goesThrough(inout Path path, Hit hit) {
     if (hit.instance == kNothing || (path.bounce & ~kEndsInAmbient) >= kMostSurfaces) {
         return false;
     }
     uint material = frame.geometries.at[frame.instances.at[hit.instance].firstGeometry + hit.geometry].material;
     bool isTransparent = frame.materials.at[material].transmission > 0.0;
-    path.bounce &= isTransparent ? ~kEndsInAmbient : ~0u;
+    if (isTransparent) {
+        path.bounce &= ~kEndsInAmbient;
+    }
     return isTransparent;
 }
 
 // Light of the sky, or from about the surface that hides it, the less the nearer that is. A ray that has not looked further, for want of
-// a sky, has found neither.
+// a sky, has found neither: it brings light for the share of rays that would meet a surface.
 vec3 ambientLight(Path path, Hit hit) {
     if (hit.instance != kNothing) {
         return ambientRadiance() * min(hit.distance / frame.occlusionDistance, 1.0);

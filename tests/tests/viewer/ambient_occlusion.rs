@@ -101,7 +101,7 @@ impl Quad {
     }
 }
 
-/// Parallelograms, seen from one side, under a sky whose radiance is 1: the reference in double precision.
+/// Parallelograms under a sky whose radiance is 1: the reference in double precision.
 struct Scene(Vec<Quad>);
 
 impl Scene {
@@ -257,6 +257,29 @@ fn a_glass_pane_is_no_wall() {
     let [expected] = seen_at(&ctx, &open, &white, [place]);
     let [light] = seen_at(&ctx, &glazed, &white, [place]);
     assert_close("the floor below a glazed window", light, expected, 0.1);
+}
+
+#[test]
+fn light_of_a_lamp_behind_a_pane_counts_once() {
+    let Some(ctx) = software_device() else { return };
+    let glowing = Material { emissive: [1.0; 3], emissive_strength: 8.0, ..matte([0.0; 3]) };
+    let transmission = Some(Transmission { factor: 1.0, texture: None });
+    let pane = Material { transmission, roughness: 0.0, ..matte([1.0; 3]) };
+    let (far, wide) = (Vec3::new(-20.0, 0.0, -20.0), 40.0);
+    let lamp = |builder: Builder| {
+        // It glows downwards and upwards, and stands beside the eye.
+        builder.quad(Vec3::new(0.5, 1.5, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0, glowing.clone())
+    };
+    let ground = |builder: Builder| builder.quad(far, Vec3::Z * wide, Vec3::X * wide, matte([0.5; 3]));
+    let bare = lamp(ground(Builder::default())).model();
+    let behind = lamp(ground(Builder::default()))
+        .quad(Vec3::new(0.3, 1.2, -3.0), Vec3::X * 6.0, Vec3::Z * 6.0, pane)
+        .model();
+    let place = Vec3::new(0.0, 0.0, 0.0);
+    let [expected] = seen_at(&ctx, &bare, &dark(), [place]);
+    let [light] = seen_at(&ctx, &behind, &dark(), [place]);
+    assert!(expected[0] > 0.1, "{expected:?}: the lamp lights the ground");
+    assert_close("ground below a lamp behind a pane", light, expected, 0.02);
 }
 
 #[test]

@@ -93,7 +93,8 @@ fn ambient(lights: &[GpuLight], emitters: DVec3, setting: &LightSetting) -> Ambi
     }
 }
 
-/// The flux of a lamp over its radiant intensity in the middle: of a spot, the integral of `lampIrradiance` of the shaders over its cone.
+/// The flux of a lamp over its radiant intensity in the middle: of a spot, the integral of `lampIrradiance` of the shaders over its cone,
+/// without its range.
 fn solid_angle(lamp: &GpuLight) -> f64 {
     let (outer, inner) = (f64::from(lamp.cone), f64::from(lamp.cos_inner));
     let share = if lamp.kind == light_kind::SPOT { 1.0 - inner + (inner - outer) / 3.0 } else { 2.0 };
@@ -210,11 +211,14 @@ mod tests {
         // The half space has half of the lamp's light where the cone is sharp, and a third of the half where it begins in the middle.
         let sharp = GpuLight { kind: light_kind::SPOT, ..lamp };
         let soft = GpuLight { cos_inner: 1.0, ..sharp };
+        // 1 - 0.8 and a third of 0.8 - 0.5, of 2.
+        let narrow = GpuLight { cone: 0.5, cos_inner: 0.8, ..sharp };
         let green = DVec3::new(0.0, 12.0 / PI, 0.0);
         for (lights, emitters, sky, by_lamps, from_outside) in [
             (&[lamp][..], DVec3::ZERO, 0.0, [0.5, 0.0, 0.0], [0.0; 3]),
             (&[sharp], DVec3::ZERO, 0.0, [0.25, 0.0, 0.0], [0.0; 3]),
             (&[soft], DVec3::ZERO, 0.0, [0.25 / 3.0, 0.0, 0.0], [0.0; 3]),
+            (&[narrow], DVec3::ZERO, 0.0, [0.5 * 0.15, 0.0, 0.0], [0.0; 3]),
             (&[], green, 0.0, [0.0, 0.5, 0.0], [0.0; 3]),
             (&[], DVec3::ZERO, 2.0, [0.0; 3], [2.0, 4.0, 0.0]),
             (&[lamp, disc], green, 2.0, [0.5, 0.5, 0.0], [3.0, 4.0, 0.0]),

@@ -44,7 +44,7 @@ impl FrameScene<'_> {
 /// What differs from the frame before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FrameChange {
-    /// Nothing that the eye or the scene depends on: the samples, the direction of the camera.
+    /// Neither the place of the eye nor the scene; the samples or the direction of the camera may.
     None,
     /// The place of the eye, or of something in the scene.
     Place,
