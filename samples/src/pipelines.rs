@@ -1,6 +1,9 @@
 //! Every pipeline of the samples as data, for programs that compile them without running them.
 
-use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
+use lvk::{
+    BlockLayout, ComputePipelineDesc, ComputePipelineHandle, Context, Format, Holder, ShaderModuleDesc,
+    ShaderModuleHandle, ShaderSource, ShaderStage,
+};
 
 use crate::catalogue;
 use crate::shader_folder::create_module;
@@ -66,6 +69,26 @@ impl SampleStage {
     /// Those of [`create_module`].
     pub fn create(&self, ctx: &Context, sample: &str) -> lvk::Result<Holder<ShaderModuleHandle>> {
         create_module(ctx, sample, &self.module())
+    }
+
+    /// Creates the pipeline of a compute stage of `sample`, which is named as the stage. `layouts` are compared with its blocks.
+    ///
+    /// # Errors
+    /// Those of [`create_module`] and of [`Context::create_compute_pipeline`].
+    pub fn create_compute_pipeline(
+        &self,
+        ctx: &Context,
+        sample: &str,
+        layouts: &[BlockLayout],
+    ) -> lvk::Result<Holder<ComputePipelineHandle>> {
+        debug_assert_eq!(self.stage, ShaderStage::Compute);
+        let module = self.create(ctx, sample)?;
+        ctx.create_compute_pipeline(&ComputePipelineDesc {
+            module: Some(*module),
+            layouts,
+            debug_name: self.name,
+            ..ComputePipelineDesc::default()
+        })
     }
 }
 

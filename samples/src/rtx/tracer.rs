@@ -2,8 +2,8 @@
 
 use bytemuck::NoUninit;
 use lvk::{
-    BlockLayout, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
-    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, ShaderStage, TextureHandle,
+    BlockLayout, CommandBuffer, ComputePipelineHandle, Context, Dependencies, HitGroup, Holder,
+    RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, TextureHandle,
 };
 
 use crate::app::frame::Frame;
@@ -51,7 +51,9 @@ impl Tracer {
     pub(crate) fn new(ctx: &Context, path: RayPath, stages: &RayStages) -> lvk::Result<Self> {
         Ok(match path {
             RayPath::Pipeline => Self::Pipeline(ray_tracing_pipeline(ctx, stages)?),
-            RayPath::Query => Self::Query(query_pipeline(ctx, stages.sample, stages.query, stages.layouts)?),
+            RayPath::Query => {
+                Self::Query(stages.query.create_compute_pipeline(ctx, stages.sample, stages.layouts)?)
+            }
         })
     }
 
@@ -102,23 +104,7 @@ pub(crate) fn compute_pipeline(
     sample: &str,
     stage: SampleStage,
 ) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    query_pipeline(ctx, sample, stage, &[])
-}
-
-fn query_pipeline(
-    ctx: &Context,
-    sample: &str,
-    stage: SampleStage,
-    layouts: &[BlockLayout],
-) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    debug_assert_eq!(stage.stage, ShaderStage::Compute);
-    let module = stage.create(ctx, sample)?;
-    ctx.create_compute_pipeline(&ComputePipelineDesc {
-        module: Some(*module),
-        layouts,
-        debug_name: stage.name,
-        ..ComputePipelineDesc::default()
-    })
+    stage.create_compute_pipeline(ctx, sample, &[])
 }
 
 fn ray_tracing_pipeline(ctx: &Context, stages: &RayStages) -> lvk::Result<Holder<RayTracingPipelineHandle>> {

@@ -1,8 +1,8 @@
 //! Pipelines of the viewer, and launches that trace rays by a ray tracing pipeline or by a compute shader with ray queries.
 
 use lvk::{
-    BlockLayout, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
-    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle,
+    BlockLayout, CommandBuffer, ComputePipelineHandle, Context, Dependencies, HitGroup, Holder,
+    RayTracingPipelineDesc, RayTracingPipelineHandle,
 };
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::pipelines::SampleStage;
@@ -67,13 +67,7 @@ pub(crate) fn compute(
     stage: SampleStage,
     layouts: &[BlockLayout],
 ) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let module = stage.create(ctx, SAMPLE)?;
-    ctx.create_compute_pipeline(&ComputePipelineDesc {
-        module: Some(*module),
-        layouts,
-        debug_name: stage.name,
-        ..ComputePipelineDesc::default()
-    })
+    stage.create_compute_pipeline(ctx, SAMPLE, layouts)
 }
 
 /// A pipeline of the ray generation shader and the hit group of all surfaces.

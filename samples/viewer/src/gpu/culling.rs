@@ -1,8 +1,8 @@
 //! Culling of instances by the camera's frustum and by what hides them, and the draws that it leaves.
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle,
-    Context, Dependencies, Holder, Readback, RenderPass,
+    BufferDesc, BufferHandle, BufferUsage, CommandBuffer, ComputePipelineHandle, Context, Dependencies,
+    Holder, Readback, RenderPass,
 };
 use lvk_samples::app::array_buffer::{array, buffer};
 
@@ -43,7 +43,7 @@ impl Culling {
         let data = Some(bytemuck::cast_slice(&arguments));
         let desc = BufferDesc { usage, data, debug_name: "draws", ..BufferDesc::default() };
         Ok(Self {
-            pipeline: pipeline(ctx)?,
+            pipeline: CULL.create_compute_pipeline(ctx, SAMPLE, CULLING_LAYOUTS)?,
             runs: array(ctx, "instances of meshes", BufferUsage::STORAGE, &runs)?,
             visible: buffer(ctx, "visible instances", 4 * (instances.table.len() as u64 + 1))?,
             arguments: ctx.create_buffer(&desc)?,
@@ -169,14 +169,4 @@ impl DrawnCounts {
 fn triangles_of(run: &GpuMeshRun, draws: &[Draw]) -> u64 {
     let own = draws.iter().skip(run.first_draw as usize).take(run.draw_count as usize);
     own.map(|draw| u64::from(draw.triangle_count)).sum()
-}
-
-fn pipeline(ctx: &Context) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let module = CULL.create(ctx, SAMPLE)?;
-    ctx.create_compute_pipeline(&ComputePipelineDesc {
-        module: Some(*module),
-        layouts: CULLING_LAYOUTS,
-        debug_name: CULL.name,
-        ..ComputePipelineDesc::default()
-    })
 }

@@ -2,10 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::Mat4;
-use lvk::{
-    BufferHandle, BufferUsage, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
-    Dependencies, Holder,
-};
+use lvk::{BufferHandle, BufferUsage, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder};
 use lvk_gltf::{Model, Pose, Primitive};
 use lvk_samples::app::array_buffer::{array, buffer};
 
@@ -179,7 +176,7 @@ impl Deformation {
             influences: array(ctx, "influences of joints", BufferUsage::STORAGE, &influences)?,
             deltas: array(ctx, "morph targets", BufferUsage::STORAGE, &deltas)?,
             moved,
-            pipeline: pipeline(ctx)?,
+            pipeline: DEFORM.create_compute_pipeline(ctx, SAMPLE, &[])?,
         }))
     }
 
@@ -265,13 +262,4 @@ fn upload_joints(cmd: &mut CommandBuffer, matrices: &[Mat4]) -> lvk::Result<u64>
 fn active_weights(weights: &[f32]) -> Vec<TargetWeight> {
     let all = (0..).zip(weights).map(|(target, &weight)| TargetWeight { target, weight });
     all.filter(|target| target.weight != 0.0).collect()
-}
-
-fn pipeline(ctx: &Context) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let module = DEFORM.create(ctx, SAMPLE)?;
-    ctx.create_compute_pipeline(&ComputePipelineDesc {
-        module: Some(*module),
-        debug_name: DEFORM.name,
-        ..ComputePipelineDesc::default()
-    })
 }

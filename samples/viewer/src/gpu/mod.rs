@@ -41,7 +41,7 @@ impl FrameScene<'_> {
     }
 }
 
-/// What differs from the frame before.
+/// The difference of a frame from the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FrameChange {
     /// Neither the place of the eye nor the scene; the samples or the direction of the camera may.

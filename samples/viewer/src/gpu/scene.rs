@@ -224,7 +224,7 @@ impl GpuScene {
         self.lights.emission
     }
 
-    /// What the ambient term depends on beside the surfaces.
+    /// Lights and box of the scene, for the ambient term.
     pub(crate) fn ambient(&self) -> AmbientConstants {
         self.lights.ambient
     }
