@@ -493,10 +493,13 @@ fn a_surface_that_a_command_buffer_keeps_is_told() {
     let swapchain = ctx.create_swapchain(&desc).unwrap();
     let image = ctx.next_image(*swapchain).unwrap().unwrap();
     let recorded = fill(&ctx, image.texture(), RED).unwrap();
-    let told = message(ctx.suspend_swapchain(*swapchain));
-    assert!(told.contains("main window") && told.contains("not submitted"), "{told}");
+    for _ in 0..2 {
+        let told = message(ctx.suspend_swapchain(*swapchain));
+        assert!(told.contains("main window") && told.contains("not submitted"), "{told}");
+    }
     drop(recorded);
     ctx.wait_idle().unwrap();
+    ctx.suspend_swapchain(*swapchain).unwrap();
     ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48]).unwrap();
     present_until_visible(&ctx, *swapchain, &window, GREEN);
 }
@@ -561,6 +564,14 @@ fn numbers_queues_and_contexts_that_do_not_fit_are_refused() {
         expect_refused(strange, &ctx.create_swapchain(&desc).unwrap_err());
     }
     let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    // A window that the swapchain cannot go on in leaves it suspended, and it goes on in the next.
+    for strange in [Strange::WithoutHandle, Strange::OfUnknownSystem] {
+        let other = strange_window::window(strange).unwrap();
+        expect_refused(strange, &ctx.resume_swapchain(*swapchain, &other, [64, 48]).unwrap_err());
+        assert!(message(ctx.swapchain_info(*swapchain)).contains("suspended"), "{strange:?}");
+        assert!(ctx.next_image(*swapchain).unwrap().is_none());
+        ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48]).unwrap();
+    }
     let image = ctx.next_image(*swapchain).unwrap().unwrap();
     let Some(other) = device() else { return };
     let foreign = |answer: Result<()>| {

@@ -270,6 +270,11 @@ fn convert_triangles(
         .index_type(vk::IndexType::NONE_KHR)
         .transform_data(host_or_device_address(matrix));
     match triangles.indices {
+        Some(_) if triangles.triangle_count > 0 && triangles.vertex_count == 0 => {
+            let message =
+                format!("{} triangles with indices need at least one vertex", triangles.triangle_count);
+            return Err(Error::usage(name, message));
+        }
         Some(indices) => {
             data = data
                 .index_type(indices.format.raw())

@@ -61,8 +61,8 @@ impl CommandBuffer {
     /// [`InvalidUsage`](Error::InvalidUsage) for a refit without
     /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a BLAS that was compacted, or
     /// compacted before it was saved, and a BLAS listed twice; [`WrongQueue`](Error::WrongQueue) on the transfer queue.
-    /// If memory for the scratch buffer or for tables of software BVHs runs out, the command buffer can no longer be
-    /// submitted. Memory for the BVHs themselves is allocated before anything is recorded.
+    /// If memory for tables of software BVHs runs out, the command buffer can no longer be submitted. Memory for the BVHs
+    /// themselves and for the scratch buffer is allocated before anything is recorded.
     pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
         self.needs_compute(BUILD_ON_QUEUE)?;
         let found: Result<Vec<_>> =
@@ -128,7 +128,6 @@ impl CommandBuffer {
         let BlasBuildPlan { open, parts, software, is_first } = plan;
         let shared = Arc::clone(&self.shared);
         if shared.gpu.accel.is_some() {
-            self.gather_inputs(open.iter().map(|build| (&*build.target, build.refit)))?;
             let alignment = shared.gpu.caps.limits.scratch_alignment.into();
             let sizes: Vec<_> = parts.iter().map(|build| build.scratch_bytes).collect();
             let own = &shared.scratch[self.recording.queue_index];
@@ -137,6 +136,7 @@ impl CommandBuffer {
             let ext = shared.gpu.accel_functions()?;
             let (scratch, replaced) = own.get_or_grow(&shared.gpu, most)?;
             self.free_replaced_scratch(replaced);
+            self.gather_inputs(open.iter().map(|build| (&*build.target, build.refit)))?;
             let base = aligned_scratch_address(scratch.address, alignment);
             for batch in batches {
                 let builds = &parts[batch.builds];
@@ -187,7 +187,9 @@ impl CommandBuffer {
         }
     }
 
-    /// Poisons the command buffer, which cannot be submitted any more: a command failed with a part of it recorded.
+    /// Poisons the command buffer, which cannot be submitted any more: a command failed with a part of it recorded. That which runs
+    /// before the next submission runs all the same, as it has the work of other calls: its failed command has written
+    /// only memory of objects whose creation fails with it, or which a later submission writes again.
     #[cold]
     pub(super) fn poison(&mut self, name: &str, error: Error) -> Error {
         self.state.poisoned.get_or_insert_with(|| name.to_owned());

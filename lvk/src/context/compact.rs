@@ -97,7 +97,9 @@ impl Context {
         if self.device_state().take_tlas_outdated()
             && let Err(error) = self.rewrite_outdated_tlas()
         {
-            log::warn!("a TLAS still references BLAS from before their compaction: {error}");
+            self.device_state().mark_tlas_outdated();
+            let remedy = "the next submission tries again";
+            log::warn!("a TLAS still references BLAS from before their compaction, and {remedy}: {error}");
         }
     }
 
@@ -178,13 +180,15 @@ impl Context {
     }
 
     /// Writes and builds again each TLAS that references replaced BLAS. Collects them a second time once the command
-    /// buffer is open: objects that another thread destroys earlier do not wait for that command buffer.
+    /// buffer is open: objects that another thread destroys earlier do not wait for that command buffer. Returns the first error
+    /// once all were tried.
     fn rewrite_outdated_tlas(&self) -> Result<()> {
         if self.outdated_tlas().is_empty() {
             return Ok(());
         }
         self.record_in_prologue(|cmd| {
-            self.outdated_tlas().iter().try_for_each(|object| cmd.rewrite_tlas(object))
+            let rewritten = self.outdated_tlas().into_iter().map(|object| cmd.rewrite_tlas(&object));
+            rewritten.fold(Ok(()), Result::and)
         })
     }
 

@@ -1,6 +1,7 @@
 //! Report of the wrong bindless indices that shaders have used.
 
 use super::Context;
+use super::readback::READBACK;
 use crate::bindless::index_checks::{IndexChecks, IndexFault};
 use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
@@ -24,7 +25,8 @@ impl Context {
                 target,
                 &[BufferCopy { source_offset: 0, target_offset: 0, size: bytes }],
             )
-        })?;
+        })
+        .map_err(|error| error.with_owner(READBACK, "index_faults"))?;
         Ok(checks.report_faults(&words))
     }
 }

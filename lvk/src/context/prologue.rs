@@ -13,6 +13,7 @@ use crate::resource::region::{Region, TextureRegion};
 use crate::resource::{Buffer, Texture};
 use crate::submit::SubmitHandle;
 use crate::upload::PendingUploads;
+use crate::upload::staging::STAGING;
 
 /// The work that runs before the next submission.
 #[derive(Default)]
@@ -87,7 +88,8 @@ impl Context {
         if bytes.is_empty() {
             return Ok(());
         }
-        let staged = self.device_state().staging.keep_region(bytes, ALIGNMENT)?;
+        let staged = self.device_state().staging.keep_region(bytes, ALIGNMENT);
+        let staged = staged.map_err(|error| error.with_owner(STAGING, &target.name))?;
         let mut pending = self.lock_prologue();
         pending.uploads.add_buffer_upload(target, offset, bytes.len() as u64, staged);
         self.flush_if_over_budget(pending)
@@ -115,8 +117,9 @@ impl Context {
         const ALIGNMENT: u64 = 16;
         target.image.add_texture()?;
         let staged = self.device_state().staging.keep_region(bytes, ALIGNMENT);
-        let staged = staged.inspect_err(|_| {
+        let staged = staged.map_err(|error| {
             target.image.remove_texture();
+            error.with_owner(STAGING, &target.name)
         })?;
         let mut pending = self.lock_prologue();
         pending.uploads.add_texture_upload(Arc::clone(target), region, bytes.len() as u64, staged);

@@ -11,6 +11,7 @@ use crate::accel::primitive_bounds::{
     AabbListBytes, Bounds, GeometryBytes, IndexBytes, TriangleBytes, VertexBytes,
 };
 use crate::command::transfer::BufferCopy;
+use crate::device_state::DeferredObject;
 use crate::error::Result;
 use crate::format::IndexFormat;
 use crate::handle::BufferHandle;
@@ -76,6 +77,7 @@ impl Context {
             self.read_back(size, bytes, |cmd, target| {
                 for (index, part) in overlaps(ranges, start..start + size) {
                     let (buffer, offset) = &list[index];
+                    self.device_state().free_later(DeferredObject::BufferRef(Arc::clone(buffer)));
                     let from = offset + (part.start - ranges[index].start);
                     cmd.copy_buffer_objects(
                         buffer,

@@ -8,6 +8,7 @@ use ash::vk;
 use super::Context;
 use super::holder::Holder;
 use super::plan_blas::{BlasInputs, convert_geometries, new_blas_object};
+use super::readback::READBACK;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{BlasPart, BlasStructures};
 use crate::accel::blas_file::{
@@ -59,13 +60,17 @@ impl Context {
         let body = blas.structures();
         let geometries = blas.geometries.iter().map(file_geometry).collect();
         if self.device_state().gpu.accel.is_none() {
-            let parts = vec![BlasFilePart { driver: self.read_software_bytes(blas)?, map: None }];
+            let bytes = self.read_software_bytes(blas);
+            let driver = bytes.map_err(|error| error.with_owner(READBACK, &object.name))?;
+            let parts = vec![BlasFilePart { driver, map: None }];
             return Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }));
         }
         let sizes = self.serialized_sizes(&object, &body)?;
         let mut parts = Vec::with_capacity(sizes.len());
         for (driver, shape) in self.serialize_parts(&object, &body, &sizes)?.into_iter().zip(&blas.parts) {
-            parts.push(BlasFilePart { driver, map: self.read_primitive_map(shape)? });
+            let map =
+                self.read_primitive_map(shape).map_err(|error| error.with_owner(READBACK, &object.name))?;
+            parts.push(BlasFilePart { driver, map });
         }
         Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }))
     }
@@ -124,7 +129,7 @@ impl Context {
         }
     }
 
-    fn serialized_sizes(&self, object: &AccelStruct, body: &BlasStructures) -> Result<Vec<u64>> {
+    fn serialized_sizes(&self, object: &AccelStruct, body: &Arc<BlasStructures>) -> Result<Vec<u64>> {
         let count = body.structures.len() as u32;
         let desc = QueryPoolDesc { count, debug_name: &object.name, ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR;
@@ -132,6 +137,7 @@ impl Context {
         let mut cmd = self.acquire_command_buffer()?;
         cmd.write_size_properties(object, body, &pool, 0, ty)?;
         self.device_state().free_later(DeferredObject::QueryPool(Arc::clone(&pool)));
+        self.device_state().free_later(DeferredObject::BlasStorage(Arc::clone(body)));
         self.wait(self.submit(cmd)?)?;
         let values = self.device_state().submitter.explain_loss(pool.values(0, count))?;
         let sizes: Option<Vec<_>> = values.into_iter().collect();
@@ -141,13 +147,14 @@ impl Context {
     fn serialize_parts(
         &self,
         object: &AccelStruct,
-        body: &BlasStructures,
+        body: &Arc<BlasStructures>,
         sizes: &[u64],
     ) -> Result<Vec<Vec<u8>>> {
         let mut all = Vec::with_capacity(sizes.len());
         for group in group_by_bytes(sizes, self.max_group_bytes()) {
-            let structures = &body.structures[group.clone()];
-            all.extend(self.serialize_group(object, structures, &sizes[group])?);
+            let sizes = &sizes[group.clone()];
+            let bytes = self.serialize_group(object, body, group, sizes);
+            all.extend(bytes.map_err(|error| error.with_owner(READBACK, &object.name))?);
         }
         Ok(all)
     }
@@ -156,7 +163,8 @@ impl Context {
     fn serialize_group(
         &self,
         object: &AccelStruct,
-        structures: &[RawAccelStruct],
+        body: &Arc<BlasStructures>,
+        group: Range<usize>,
         sizes: &[u64],
     ) -> Result<Vec<Vec<u8>>> {
         let places = AlignedOffsets::new(sizes);
@@ -166,7 +174,9 @@ impl Context {
         let mut bytes = vec![0; places.total as usize];
         self.read_back(places.total, &mut bytes, |cmd, target| {
             self.device_state().free_later(DeferredObject::Buffer(Arc::clone(&buffer)));
-            cmd.serialize_parts(object, structures, &buffer, &addresses)?;
+            // A compaction may replace the structures while the copy is under way.
+            self.device_state().free_later(DeferredObject::BlasStorage(Arc::clone(body)));
+            cmd.serialize_parts(object, &body.structures[group], &buffer, &addresses)?;
             cmd.copy_buffer_objects(
                 &buffer,
                 target,
@@ -186,6 +196,7 @@ impl Context {
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
         let size = bytes.len() as u64;
         self.read_back(size, bytes, |cmd, target| {
+            self.device_state().free_later(DeferredObject::BufferRef(Arc::clone(&map.table)));
             cmd.copy_buffer_objects(
                 &map.table,
                 target,

@@ -140,6 +140,7 @@ impl Context {
         let presented = Some(shown.object.image.id);
         let more = Submission { signals: vec![drawn], presented, ..Submission::default() };
         let submission = self.submit_with_semaphores(cmd, more)?;
+        shown.sync.drawn_at = submission.value;
         let answer = current.chain.present(index, mode, &shown.sync);
         // Even if the window has changed, the engine waits for the semaphore and signals the fence.
         shown.sync.presented = !matches!(answer, Err(Failure::Other(_)));
@@ -168,24 +169,21 @@ impl Context {
     /// Destroys the images, the `VkSwapchainKHR` and the `VkSurfaceKHR` of a swapchain before it returns, so that its
     /// window can go, as an Android application's does when it is paused. Waits for the GPU. The handle stays:
     /// [`next_image`](Self::next_image) returns `None` until [`resume_swapchain`](Self::resume_swapchain). Costs
-    /// nothing if the swapchain is suspended.
+    /// nothing if the surface is gone already.
     ///
     /// # Errors
+    /// The swapchain is suspended all the same, and its surface stays; another call tries again.
     /// [`InvalidUsage`](Error::InvalidUsage) if views of its images, or command buffers that were not submitted, keep
-    /// the surface: it is destroyed when they are dropped. The swapchain is suspended all the same.
-    /// [`StaleHandle`](Error::StaleHandle), [`DeviceLost`](Error::DeviceLost).
+    /// the surface: it is destroyed when they are dropped. [`StaleHandle`](Error::StaleHandle),
+    /// [`DeviceLost`](Error::DeviceLost).
     pub fn suspend_swapchain(&self, swapchain: SwapchainHandle) -> Result<()> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
-        if lifecycle.is_suspended() {
-            return Ok(());
-        }
-        let surface = resources.surface.as_ref().map(Arc::downgrade);
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let suspended = lifecycle.suspend(&object.name, &mut live);
         self.device_state().submitter.explain_loss(suspended)?;
-        if surface.is_some_and(|surface| surface.strong_count() > 0) {
+        if resources.released.strong_count() > 0 {
             let message = "views of its images, or command buffers that were not submitted, keep its surface; drop \
                            them before its window goes";
             return Err(Error::usage(&*object.name, message));
@@ -246,6 +244,9 @@ impl Context {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
+        if lifecycle.is_suspended() {
+            return Err(Error::usage(&*object.name, "it is suspended; resume it in a window first"));
+        }
         let rebuilds = resources.rebuilds.saturating_sub(1);
         if let Some(current) = &resources.current {
             return Ok(SwapchainInfo {
@@ -257,9 +258,6 @@ impl Context {
                 image_count: current.images.len() as u32,
                 rebuilds,
             });
-        }
-        if lifecycle.is_suspended() {
-            return Err(Error::usage(&*object.name, "it is suspended; resume it in a window first"));
         }
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let planned =
@@ -281,7 +279,10 @@ impl Context {
         let mut guard = swapchain.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
         lifecycle.mark_out_of_date();
-        LiveBackend { ctx: self, name: &swapchain.name, resources }.retire_current();
+        let mut live = LiveBackend { ctx: self, name: &swapchain.name, resources };
+        if let Err(error) = live.retire_current() {
+            log::error!("{}: an acquired image cannot be released: {error}", readable_name(&*swapchain.name));
+        }
         drop(guard);
         self.device_state().free_later(DeferredObject::Swapchain(swapchain));
     }
@@ -307,11 +308,18 @@ impl PresentBackend for LiveBackend<'_> {
 
     /// Waits for the GPU: this is rare, and swapchains must be destroyed before the window can have another surface.
     fn release_surface(&mut self) -> Result<(), Failure> {
+        if self.resources.surface.is_none() && self.resources.has_no_chains() {
+            return Ok(());
+        }
         self.resources.wait_for_presents()?;
-        self.retire_current();
-        self.ctx.wait_idle()?;
+        let retired = self.retire_current();
+        let idle = self.ctx.wait_idle();
+        retired?;
+        idle?;
         self.resources.clear_retired();
-        self.resources.surface = None;
+        if let Some(surface) = self.resources.surface.take() {
+            self.resources.released = Arc::downgrade(&surface);
+        }
         Ok(())
     }
 
@@ -324,8 +332,14 @@ impl PresentBackend for LiveBackend<'_> {
         let (offered_modes, plan) = self.choose_chain(&surface, &surface.state()?, extent)?;
         let old = self.resources.current.as_ref().map(|current| Arc::clone(&current.chain));
         let made = Chain::new(&surface, &plan, old.as_deref(), self.name);
-        self.retire_current();
+        // The first call that finds the device lost is in the report, and the next may find that too.
+        let made = made.map_err(|failure| match failure {
+            Failure::Other(error) => Failure::Other(self.ctx.device_state().submitter.explain_error(error)),
+            of_window => of_window,
+        });
+        let retired = self.retire_current();
         let chain = Arc::new(made?);
+        retired?;
         if let Some(hdr) = &self.resources.config.hdr {
             chain.set_hdr(hdr)?;
         }
@@ -414,7 +428,8 @@ impl LiveBackend<'_> {
             match self.new_image(chain, plan, raw) {
                 Ok(image) => images.push(image),
                 Err(error) => {
-                    self.retire_images(images);
+                    // None of them is acquired, so no wait can fail.
+                    drop(self.retire_images(images));
                     return Err(error.into());
                 }
             }
@@ -447,18 +462,23 @@ impl LiveBackend<'_> {
     }
 
     /// Retires the Vulkan swapchain. Its images and presents live until they are no longer in use.
-    fn retire_current(&mut self) {
-        let Some(current) = self.resources.current.take() else { return };
-        let syncs = self.retire_images(current.images);
+    fn retire_current(&mut self) -> Result<()> {
+        let Some(current) = self.resources.current.take() else { return Ok(()) };
+        let (syncs, released) = self.retire_images(current.images);
         self.resources.retire(current.chain, syncs);
         if let Some(semaphore) = self.resources.signalled.take() {
-            self.resources
-                .recycle_semaphore(semaphore, self.ctx.device_state().submitter.last_of_queues()[0]);
+            // Without a wait the semaphore stays signalled, so no other acquisition may have it.
+            let free_at = match &released {
+                Ok(()) => self.ctx.device_state().submitter.last_of_queues()[0],
+                Err(_) => u64::MAX,
+            };
+            self.resources.recycle_semaphore(semaphore, free_at);
         }
+        released
     }
 
-    /// Destroys the textures of images. Submits waits for images that were acquired and not used.
-    fn retire_images(&mut self, images: Vec<ChainImage>) -> Vec<PresentSync> {
+    /// Destroys the textures of images. Submits waits for images that were acquired and not used, and returns the result of that.
+    fn retire_images(&mut self, images: Vec<ChainImage>) -> (Vec<PresentSync>, Result<()>) {
         let shared = self.ctx.device_state();
         let mut waits = Vec::new();
         let mut syncs = Vec::new();
@@ -470,14 +490,12 @@ impl LiveBackend<'_> {
             }
             syncs.push(image.sync);
         }
-        if !waits.is_empty() {
-            self.wait_for_semaphores(&waits);
-        }
-        syncs
+        let released = if waits.is_empty() { Ok(()) } else { self.wait_for_semaphores(&waits) };
+        (syncs, released)
     }
 
     /// Submits waits for signalled semaphores, which can be used again only after a wait.
-    fn wait_for_semaphores(&self, semaphores: &[vk::Semaphore]) {
+    fn wait_for_semaphores(&self, semaphores: &[vk::Semaphore]) -> Result<()> {
         let wait = |semaphore: &vk::Semaphore| {
             vk::SemaphoreSubmitInfo::default()
                 .semaphore(*semaphore)
@@ -485,8 +503,6 @@ impl LiveBackend<'_> {
         };
         let waits = semaphores.iter().map(wait).collect();
         let submission = Submission { waits, ..Submission::default() };
-        if let Err(error) = self.ctx.device_state().submitter.submit(submission, || {}).1 {
-            log::error!("{}: an acquired image cannot be released: {error}", readable_name(&**self.name));
-        }
+        self.ctx.device_state().submitter.submit(submission, || {}).1
     }
 }

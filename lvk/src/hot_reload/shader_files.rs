@@ -93,8 +93,8 @@ impl ShaderFiles {
 
     /// Adds the files of a later build.
     pub(super) fn add(&self, later: &Self) {
-        let later = std::mem::take(&mut later.lock().stamps);
-        self.lock().stamps.extend(later);
+        let later = std::mem::replace(&mut *later.lock(), WatchedFiles::new(Duration::ZERO));
+        self.lock().add(later);
     }
 
     /// Checks the file from now on. Called before the file is read, so that no later change is missed.
@@ -142,6 +142,12 @@ struct WatchedFiles {
 impl WatchedFiles {
     fn new(period: Duration) -> Self {
         Self { stamps: BTreeMap::new(), changed: false, period, last_check: Instant::now() }
+    }
+
+    /// Adds the files of another list, as they were when its files were read.
+    fn add(&mut self, later: Self) {
+        self.stamps.extend(later.stamps);
+        self.changed |= later.changed;
     }
 
     fn watch(&mut self, path: &Path, found: Stamp) {
@@ -196,6 +202,24 @@ mod tests {
         assert_eq!(polls(&mut watched), [true, false]);
         fs::remove_file(&file).unwrap();
         assert_eq!([polls(&mut watched), polls(&mut watched)], [[true, false], [false, false]]);
+    }
+
+    /// The first of two modules of a build has the old text and fails, the second has the new one.
+    #[test]
+    fn a_change_within_a_build_that_fails_is_not_lost() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("shared.glsl");
+        fs::write(&file, "a").unwrap();
+        let files = ShaderFiles::new();
+        files.set_period(Duration::ZERO);
+        files.watch(&file);
+        let failed = files.sibling();
+        failed.watch(&file);
+        fs::write(&file, "ab").unwrap();
+        failed.watch(&file);
+        files.add(&failed);
+        assert!(files.changed(), "the first module was not compiled from the new text");
+        assert!(!files.changed());
     }
 
     #[test]

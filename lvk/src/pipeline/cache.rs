@@ -64,11 +64,12 @@ impl PipelineCache {
 
     /// Writes the file. Without `always`, an unchanged file is not written again.
     fn write(&self, always: bool) -> Result<()> {
+        // Before the data is read: what another thread reads later must not be overwritten.
+        let mut on_disk = self.on_disk.lock();
         // SAFETY: the cache is alive.
         let data = unsafe { self.gpu.device.get_pipeline_cache_data(self.raw) }
             .map_err(Error::vulkan("vkGetPipelineCacheData", self.path.display()))?;
         let sum = checksum(&[&data]);
-        let mut on_disk = self.on_disk.lock();
         if !always && *on_disk == Some(sum) && self.path.exists() {
             return Ok(());
         }

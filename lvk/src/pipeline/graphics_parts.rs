@@ -84,15 +84,17 @@ impl GraphicsParts {
     ) -> Result<Arc<PipelinePart>> {
         let modules = modules.of_part(part);
         let constants = declared(desc.specialization, &modules);
-        let desc = part.reduce(desc, &constants);
-        if let Some(found) = self.find(part, &desc) {
+        let reduced = part.reduce(desc, &constants);
+        if let Some(found) = self.find(part, &reduced) {
             return Ok(found);
         }
         let mut library = vk::GraphicsPipelineLibraryCreateInfoEXT::default().flags(part.raw());
-        let raw = create_pipeline(gpu, base, &desc, &modules, Some(&mut library))?;
-        gpu.name(raw, desc.debug_name);
+        // An error names the pipeline; in tools the part has a name of its own, as other pipelines may share it.
+        let of_pipeline = RenderPipelineDesc { debug_name: desc.debug_name, ..reduced };
+        let raw = create_pipeline(gpu, base, &of_pipeline, &modules, Some(&mut library))?;
+        gpu.name(raw, reduced.debug_name);
         let made = Arc::new(PipelinePart { raw, gpu: Arc::clone(gpu) });
-        let known = KnownPart { part, desc: OwnedRenderDesc::new(&desc), compiled: Arc::downgrade(&made) };
+        let known = KnownPart { part, desc: OwnedRenderDesc::new(&reduced), compiled: Arc::downgrade(&made) };
         self.known.lock().push(known);
         Ok(made)
     }

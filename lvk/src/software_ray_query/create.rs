@@ -104,10 +104,11 @@ impl Context {
     pub(crate) fn read_software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
         let Some(software) = &blas.software else { return Ok(Vec::new()) };
         let body = software.moved_storage().unwrap_or(&software.storage);
-        let size = body.memory_bytes();
+        let (shared, size) = (self.device_state(), body.memory_bytes());
         let mut bytes = vec![0; SOFTWARE_BLOB_UUID.len() + size as usize];
         bytes[..SOFTWARE_BLOB_UUID.len()].copy_from_slice(&SOFTWARE_BLOB_UUID);
         self.read_back(size, &mut bytes[SOFTWARE_BLOB_UUID.len()..], |cmd, target| {
+            shared.free_later(DeferredObject::SoftwareStorage(Arc::clone(body)));
             cmd.read_software_blas(body);
             cmd.copy_buffer_objects(
                 body.buffer(),

@@ -15,12 +15,14 @@ use crate::queue::Queue;
 impl<T> Submitter<T> {
     /// Adds the unfinished submissions to the error of a lost device. Locks the submitter.
     pub(crate) fn explain_loss<R>(&self, result: Result<R>) -> Result<R> {
-        match result {
-            Err(error @ Error::DeviceLost { .. }) => Err(self.with_ring(|ring, last| {
-                let Error::DeviceLost { report } = &error else { return error };
-                self.loss_error(ring, last, report)
-            })),
-            other => other,
+        result.map_err(|error| self.explain_error(error))
+    }
+
+    /// As [`explain_loss`](Self::explain_loss), for an error.
+    pub(crate) fn explain_error(&self, error: Error) -> Error {
+        match &error {
+            Error::DeviceLost { report } => self.with_ring(|ring, last| self.loss_error(ring, last, report)),
+            _ => error,
         }
     }
 

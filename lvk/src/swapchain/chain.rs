@@ -149,6 +149,8 @@ pub(crate) struct PresentSync {
     present_fence: Option<vk::Fence>,
     /// True if the image was presented with these objects since its last acquisition.
     pub(crate) presented: bool,
+    /// Timeline value of the last submission that signals `drawn`.
+    pub(crate) drawn_at: u64,
     /// True if the presentation engine never finishes the image's presents, as far as the library can tell. For tests.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) stalls: bool,
@@ -164,6 +166,7 @@ impl PresentSync {
             drawn,
             present_fence: None,
             presented: false,
+            drawn_at: 0,
             #[cfg(any(test, feature = "test-hooks"))]
             stalls: false,
             name: name.into(),
@@ -193,10 +196,11 @@ impl PresentSync {
         !self.presented || self.present_fence.is_some()
     }
 
-    /// Returns true if the presents are finished; `None` if the device cannot tell.
-    pub(crate) fn is_done(&self) -> Result<Option<bool>> {
+    /// Returns true if nothing uses the objects when the timeline has reached `completed`; `None` if the device cannot tell.
+    pub(crate) fn is_done(&self, completed: u64) -> Result<Option<bool>> {
         if !self.presented {
-            return Ok(Some(true));
+            // A present that failed leaves the semaphore to the submission before it.
+            return Ok(Some(self.drawn_at <= completed));
         }
         let Some(fence) = self.present_fence else { return Ok(None) };
         // SAFETY: the fence is alive.

@@ -11,7 +11,7 @@ pub(crate) trait PresentBackend {
     /// Returns the size of new images; `None` if no image can be presented.
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure>;
 
-    /// Destroys the swapchain and its surface, if they are there.
+    /// Destroys the swapchain and its surface, if they are there. On failure they may stay, and another call tries again.
     fn release_surface(&mut self) -> Result<(), Failure>;
 
     /// Creates a surface for the window, which has none.
@@ -162,7 +162,7 @@ impl SwapchainState {
         Ok(RecreateStep::Again)
     }
 
-    /// Destroys the surface. There are no images until [`resume`](Self::resume).
+    /// Destroys the surface, if it is there. There are no images until [`resume`](Self::resume), on failure neither.
     pub(crate) fn suspend(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
         (self.acquired, self.extent) = (None, None);
         self.status = SwapchainStatus::Suspended;
@@ -173,6 +173,16 @@ impl SwapchainState {
     /// suspended.
     pub(crate) fn resume(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
         self.suspend(name, backend)?;
+        let resumed = self.start_in_window(name, backend);
+        if resumed.is_err()
+            && let Err(error) = self.suspend(name, backend)
+        {
+            log::warn!("{}: its surface stays until it is suspended again: {error}", readable_name(name));
+        }
+        resumed
+    }
+
+    fn start_in_window(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
         backend.create_surface().map_err(|failure| failure.into_error(name))?;
         self.status = SwapchainStatus::OutOfDate;
         self.prepare(name, backend)
@@ -242,6 +252,7 @@ enum RecreateStep<T> {
 mod tests {
     use std::collections::VecDeque;
 
+    use ash::vk;
     use proptest::prelude::*;
 
     use super::*;
@@ -499,35 +510,75 @@ mod tests {
         assert!(second.ticket > first.ticket);
     }
 
-    #[test]
-    fn a_window_that_takes_no_surface_leaves_the_swapchain_suspended() {
-        struct Refusing;
-        impl PresentBackend for Refusing {
-            fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
-                panic!("there is no surface")
-            }
-            fn release_surface(&mut self) -> Result<(), Failure> {
-                Ok(())
-            }
-            fn create_surface(&mut self) -> Result<(), Failure> {
-                Err(Error::unsupported("presentation to this window", "a test").into())
-            }
-            fn recreate_swapchain(&mut self, _: [u32; 2]) -> Result<(), Failure> {
-                panic!("there is no surface")
-            }
-            fn acquire(&mut self) -> Result<Acquired, Failure> {
-                panic!("there is no surface")
-            }
+    /// A window that takes no surface, or a surface and no swapchain. Tells whether the surface is there.
+    struct Refusing {
+        takes_surface: bool,
+        has_surface: bool,
+        release_fails: bool,
+    }
+
+    impl PresentBackend for Refusing {
+        fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
+            assert!(self.has_surface, "there is no surface");
+            Ok(Some([8, 8]))
         }
-        let mut state = SwapchainState::new();
-        let error = state.resume("window", &mut Refusing).unwrap_err();
-        assert!(matches!(error, Error::Unsupported { .. }), "{error:?}");
-        assert!(state.is_suspended());
-        assert_eq!(state.acquire_image("window", &mut Refusing).unwrap(), None);
+        fn release_surface(&mut self) -> Result<(), Failure> {
+            if self.release_fails && self.has_surface {
+                return Err(
+                    Error::vulkan("vkQueueWaitIdle", "window")(vk::Result::ERROR_OUT_OF_HOST_MEMORY).into()
+                );
+            }
+            self.has_surface = false;
+            Ok(())
+        }
+        fn create_surface(&mut self) -> Result<(), Failure> {
+            assert!(!self.has_surface, "a window takes no second surface");
+            self.has_surface = self.takes_surface;
+            let refused = || Error::unsupported("presentation to this window", "a test").into();
+            self.takes_surface.then_some(()).ok_or_else(refused)
+        }
+        fn recreate_swapchain(&mut self, _: [u32; 2]) -> Result<(), Failure> {
+            assert!(self.has_surface, "there is no surface");
+            Err(Error::unsupported("a swapchain of this window", "a test").into())
+        }
+        fn acquire(&mut self) -> Result<Acquired, Failure> {
+            panic!("there is no swapchain")
+        }
+    }
+
+    #[test]
+    fn a_window_that_takes_no_surface_or_no_swapchain_leaves_the_swapchain_suspended() {
+        for takes_surface in [false, true] {
+            let mut backend = Refusing { takes_surface, has_surface: false, release_fails: false };
+            let mut state = SwapchainState::new();
+            let error = state.resume("window", &mut backend).unwrap_err();
+            assert!(matches!(error, Error::Unsupported { .. }), "{error:?}");
+            assert!(state.is_suspended() && !backend.has_surface, "{takes_surface}");
+            assert_eq!(state.acquire_image("window", &mut backend).unwrap(), None);
+        }
         // The window of a lost surface has had one before, so its refusal is a loss.
+        let mut backend = Refusing { takes_surface: false, has_surface: false, release_fails: false };
+        let mut state = SwapchainState::new();
         state.status = SwapchainStatus::SurfaceLost;
-        let error = state.acquire_image("window", &mut Refusing).unwrap_err();
+        let error = state.acquire_image("window", &mut backend).unwrap_err();
         assert!(matches!(error, Error::SurfaceLost { .. }), "{error:?}");
+    }
+
+    /// A surface that stays, as the wait for its presents failed, is destroyed by the next call.
+    #[test]
+    fn a_surface_that_cannot_be_destroyed_is_told_each_time() {
+        let mut backend = Refusing { takes_surface: true, has_surface: false, release_fails: true };
+        let mut state = SwapchainState::new();
+        let error = state.resume("window", &mut backend).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }), "the first error is the cause: {error:?}");
+        for _ in 0..2 {
+            assert!(state.is_suspended() && backend.has_surface);
+            assert!(matches!(state.suspend("window", &mut backend), Err(Error::OutOfHostMemory { .. })));
+            assert!(matches!(state.resume("window", &mut backend), Err(Error::OutOfHostMemory { .. })));
+        }
+        backend.release_fails = false;
+        state.suspend("window", &mut backend).unwrap();
+        assert!(state.is_suspended() && !backend.has_surface);
     }
 
     #[test]

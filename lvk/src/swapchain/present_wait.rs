@@ -1,6 +1,8 @@
-//! Timeout of waits for the presentation engine. Needs no device.
+//! Waits for the presentation engine. Needs no device.
 
-use crate::error::Result;
+use std::time::Duration;
+
+use crate::error::{Error, Result};
 
 /// Maximum time to wait for presents, in nanoseconds. A hidden window may never have a free image, and a terminated
 /// engine never finishes a present. The application must not hang because of them.
@@ -27,10 +29,29 @@ pub(super) fn wait_for_all<T>(
     all.map(|()| given_up)
 }
 
+/// Asks for about a second until all presents are finished, where a wait for them has failed for lack of memory. `ask` returns the
+/// number of unfinished presents, and may lack memory too. Returns the last answer.
+pub(super) fn ask_until_finished(
+    mut ask: impl FnMut() -> Result<usize>,
+    mut pause: impl FnMut(Duration),
+) -> Result<usize> {
+    const PAUSE: Duration = Duration::from_millis(20);
+    const TRIES: usize = 50;
+    for _ in 1..TRIES {
+        match ask() {
+            Ok(0) => return Ok(0),
+            Ok(_) | Err(Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. }) => pause(PAUSE),
+            Err(error) => return Err(error),
+        }
+    }
+    ask()
+}
+
 #[cfg(test)]
 mod tests {
+    use ash::vk;
+
     use super::*;
-    use crate::error::Error;
 
     #[test]
     fn a_present_that_never_ends_times_out_and_the_others_are_polled() {
@@ -43,6 +64,25 @@ mod tests {
         let expected = [(0, PRESENT_TIMEOUT_NS), (1, PRESENT_TIMEOUT_NS), (2, 0), (3, 0), (4, 0)];
         assert_eq!(asked, expected);
         assert_eq!(wait_for_all(0..0, |_: u32, _| Ok(false)).unwrap(), 0);
+    }
+
+    #[test]
+    fn presents_are_asked_for_until_they_are_finished_or_a_second_is_over() {
+        let asked = |answers: &[std::result::Result<usize, vk::Result>]| {
+            let (mut calls, mut pauses) = (0, 0);
+            let ask = || {
+                calls += 1;
+                answers[(calls - 1).min(answers.len() - 1)].map_err(Error::vulkan("vkGetFenceStatus", "test"))
+            };
+            let answer = ask_until_finished(ask, |_| pauses += 1);
+            (answer.map_err(|error| error.to_string().contains("memory")), calls, pauses)
+        };
+        let (lost, short) = (vk::Result::ERROR_DEVICE_LOST, vk::Result::ERROR_OUT_OF_HOST_MEMORY);
+        assert_eq!(asked(&[Ok(0)]), (Ok(0), 1, 0));
+        assert_eq!(asked(&[Err(short), Ok(2), Ok(0)]), (Ok(0), 3, 2));
+        assert_eq!(asked(&[Ok(2), Err(lost)]), (Err(false), 2, 1));
+        assert_eq!(asked(&[Ok(2)]), (Ok(2), 50, 49));
+        assert_eq!(asked(&[Err(short)]), (Err(true), 50, 49));
     }
 
     #[test]

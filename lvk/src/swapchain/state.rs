@@ -1,13 +1,13 @@
 //! A swapchain with all of its state that changes from frame to frame.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use ash::vk;
 
 use super::chain::{Chain, ChainPlan, PresentSync, new_semaphore};
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
 use super::lifecycle::SwapchainState;
-use super::present_wait::wait_for_all;
+use super::present_wait::{ask_until_finished, wait_for_all};
 use super::surface::Surface;
 use crate::barrier::ResourceId;
 use crate::error::readable::readable_name;
@@ -47,8 +47,10 @@ pub(crate) struct SwapchainResources {
     name: Arc<str>,
     pub(crate) config: SwapchainConfig,
     pub(crate) window: Arc<dyn WindowHandles>,
-    /// `None` only after a surface was lost and no other could be created.
+    /// `None` while the swapchain is suspended, and after a surface was lost and no other could be created.
     pub(crate) surface: Option<Arc<Surface>>,
+    /// The surface before. It lives as long as command buffers or views keep its images.
+    pub(crate) released: Weak<Surface>,
     /// `None` without images, for example for a minimised window.
     pub(crate) current: Option<Current>,
     /// Acquire semaphores, each with the timeline value from which on it is free.
@@ -93,6 +95,7 @@ impl Swapchain {
             config,
             window: Arc::clone(&surface.window),
             surface: Some(Arc::new(surface)),
+            released: Weak::new(),
             current: None,
             semaphores: Vec::new(),
             signalled: None,
@@ -159,25 +162,68 @@ impl SwapchainResources {
 
     /// Waits until all presents are finished, but at most for the timeout.
     pub(crate) fn wait_for_presents(&self) -> Result<()> {
-        let current = self.current.iter().flat_map(|current| &current.images).map(|image| &image.sync);
-        let retired = self.retired.iter().flat_map(|retired| &retired.syncs);
         let mut told = true;
-        let given_up = wait_for_all(current.chain(retired), |sync, timeout_ns| {
+        let given_up = wait_for_all(self.syncs(), |sync, timeout_ns| {
             told &= sync.reports_completion();
             sync.wait(timeout_ns)
         })?;
         if given_up > 0 {
-            log::warn!(
-                "{}: presents that do not end within the timeout are abandoned: {given_up}",
-                readable_name(&*self.name)
-            );
+            self.warn_of_abandoned(given_up);
         } else if told {
             return Ok(());
         }
+        self.wait_for_queue()
+    }
+
+    /// Waits as [`wait_for_presents`](Self::wait_for_presents) does. Where memory for that lacks, asks for about a second.
+    fn wait_persistently(&self) -> Result<()> {
+        match self.wait_for_presents() {
+            Err(Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. }) => {}
+            ended => return ended,
+        }
+        let unfinished = ask_until_finished(|| self.count_unfinished(), std::thread::sleep)?;
+        if unfinished > 0 {
+            self.warn_of_abandoned(unfinished);
+        }
+        Ok(())
+    }
+
+    /// Returns the number of presents that are not finished.
+    fn count_unfinished(&self) -> Result<usize> {
+        let mut unfinished = 0;
+        for sync in self.syncs() {
+            match sync.is_done(u64::MAX)? {
+                Some(done) => unfinished += usize::from(!done),
+                None => self.wait_for_queue()?,
+            }
+        }
+        Ok(unfinished)
+    }
+
+    /// Returns the synchronisation objects of all presents.
+    fn syncs(&self) -> impl Iterator<Item = &PresentSync> {
+        let current = self.current.iter().flat_map(|current| &current.images).map(|image| &image.sync);
+        current.chain(self.retired.iter().flat_map(|retired| &retired.syncs))
+    }
+
+    /// Waits for the queue that presents images.
+    fn wait_for_queue(&self) -> Result<()> {
         let queue = self.gpu.graphics_queue();
         // SAFETY: the queue is locked.
         unsafe { self.gpu.device.queue_wait_idle(*queue) }
             .map_err(Error::vulkan("vkQueueWaitIdle", "graphics queue"))
+    }
+
+    fn warn_of_abandoned(&self, count: usize) {
+        log::warn!(
+            "{}: presents that do not end within the timeout are abandoned: {count}",
+            readable_name(&*self.name)
+        );
+    }
+
+    /// True if there is no Vulkan swapchain, neither one in use nor a replaced one.
+    pub(crate) fn has_no_chains(&self) -> bool {
+        self.current.is_none() && self.retired.is_empty()
     }
 
     /// Destroys all replaced swapchains. Their presents are finished or abandoned.
@@ -189,7 +235,7 @@ impl SwapchainResources {
 impl RetiredChain {
     fn is_done(&self, completed: u64) -> Result<bool> {
         for sync in &self.syncs {
-            match sync.is_done()? {
+            match sync.is_done(completed)? {
                 Some(true) => {}
                 Some(false) => return Ok(false),
                 None => return Ok(self.over_at.is_some_and(|value| value <= completed)),
@@ -201,11 +247,20 @@ impl RetiredChain {
 
 impl Drop for SwapchainResources {
     fn drop(&mut self) {
-        if let Err(error) = self.wait_for_presents() {
-            log::error!(
-                "{}: destroyed before its last images were presented: {error}",
-                readable_name(&*self.name)
-            );
+        match self.wait_persistently() {
+            Ok(()) => {}
+            // A lost device uses no objects.
+            Err(error @ Error::DeviceLost { .. }) => {
+                log::error!("{}: its last images may not be shown: {error}", readable_name(&*self.name));
+            }
+            Err(error) => {
+                log::error!(
+                    "{}: {error}; its swapchain is leaked with its device, because the window may still use it",
+                    readable_name(&*self.name)
+                );
+                std::mem::forget((self.current.take(), std::mem::take(&mut self.retired)));
+                return;
+            }
         }
         let all = self.semaphores.drain(..).map(|(semaphore, _)| semaphore).chain(self.signalled.take());
         for semaphore in all {

@@ -11,6 +11,9 @@ use crate::gpu::memory::allocator::{Mapping, MemoryKind};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
+/// Name of the buffers, for errors and tools.
+pub(crate) const STAGING: &str = "staging";
+
 /// Bytes that the host has written for commands.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StagingRegion {
@@ -226,14 +229,14 @@ unsafe fn fill_region<R>(
     buffer: &Buffer,
     fill: impl FnOnce(&mut [u8]) -> R,
 ) -> Result<R> {
-    let mapped = buffer.mapped().ok_or_else(|| Error::usage("staging", "the memory is not mapped"))?;
+    let mapped = buffer.mapped().ok_or_else(|| Error::usage(STAGING, "the memory is not mapped"))?;
     // SAFETY: the caller's promise.
     Ok(fill(unsafe { std::slice::from_raw_parts_mut(mapped.as_ptr().add(offset as usize), bytes as usize) }))
 }
 
 #[cold]
 fn out_of_memory_error() -> Error {
-    Error::usage("staging", "a new chunk has no room")
+    Error::usage(STAGING, "a new chunk has no room")
 }
 
 fn new_page(gpu: &Arc<Gpu>, bytes: u64, memory: MemoryKind) -> Result<Buffer> {
@@ -243,7 +246,7 @@ fn new_page(gpu: &Arc<Gpu>, bytes: u64, memory: MemoryKind) -> Result<Buffer> {
         usage: BufferUsage::STORAGE | inputs,
         memory,
         data: None,
-        debug_name: "staging",
+        debug_name: STAGING,
     };
     Buffer::new(gpu, &desc, InternalUsage::NONE)
 }

@@ -96,7 +96,7 @@ pub enum Span {
     /// The call and all later ones of the same command.
     Command,
     /// The call and all later ones of every command, as far as the command may answer the error. A shortage of memory spares
-    /// questions about the progress of work ([`PROGRESS`]), so that a context can learn that its work has ended.
+    /// questions about the progress of work and of presents ([`PROGRESS`], [`PRESENTED`]), so that a context can learn that its work has ended.
     Stays,
     /// The same, and questions about the progress of work fail too.
     Unanswered,
@@ -104,6 +104,9 @@ pub enum Span {
 
 /// The command that asks how far the work of a queue is.
 pub const PROGRESS: &str = "vkGetSemaphoreCounterValue";
+
+/// The command that asks whether a present has ended.
+pub const PRESENTED: &str = "vkGetFenceStatus";
 
 impl Span {
     /// Every span.
@@ -126,7 +129,7 @@ impl Span {
         match self {
             Self::Once => false,
             Self::Command => command == of,
-            Self::Stays => command != PROGRESS || !error.is_shortage(),
+            Self::Stays => ![PROGRESS, PRESENTED].contains(&command) || !error.is_shortage(),
             Self::Unanswered => true,
         }
     }
@@ -204,8 +207,10 @@ mod tests {
             assert!(!goes_on(Span::Once, error, "vkMapMemory"));
             assert!(goes_on(Span::Command, error, "vkMapMemory") && !goes_on(Span::Command, error, PROGRESS));
             assert!(goes_on(Span::Stays, error, "vkQueueWaitIdle"));
-            assert_eq!(goes_on(Span::Stays, error, PROGRESS), !error.is_shortage());
-            assert!(goes_on(Span::Unanswered, error, PROGRESS));
+            for question in [PROGRESS, PRESENTED] {
+                assert_eq!(goes_on(Span::Stays, error, question), !error.is_shortage());
+                assert!(goes_on(Span::Unanswered, error, question));
+            }
         }
     }
 

@@ -49,6 +49,7 @@ fn queues_refuse_what_they_cannot_do() {
             wrong_queue(cmd.clear_texture(*depth, ClearValue::Depth(1.0), &all), queue);
             wrong_queue(cmd.copy_texture_to_buffer(*depth, &whole, *words, 0), queue);
             wrong_queue(cmd.copy_buffer_to_texture(*words, 0, *depth, &whole), queue);
+            wrong_queue(cmd.update_texture(*depth, &whole, &[0; 4 * 4 * 4]), queue);
             wrong_queue(cmd.begin_query(*occlusion, 0), queue);
             if queue == Queue::Transfer {
                 wrong_queue(cmd.bind_compute_pipeline(*pipeline), queue);

@@ -7,8 +7,8 @@ use std::os::fd::OwnedFd;
 use lvk::ash::vk;
 use lvk::{
     BufferDesc, BufferUsage, ClearValue, Context, Dependencies, DeviceProfile, Error, FeatureSet, Format,
-    MemoryFd, MemoryFdType, MemoryKind, OptionalFeature, RawSignal, RawWait, SemaphoreFdType, SemaphoreKind,
-    TextureDesc, TextureKind, TextureRange, TextureRegion, TextureUsage,
+    MemoryFd, MemoryFdType, MemoryKind, OptionalFeature, Queue, RawSignal, RawWait, SemaphoreFdType,
+    SemaphoreKind, TextureDesc, TextureKind, TextureRange, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::{TestDevice, device, device_with};
@@ -237,6 +237,18 @@ fn objects_without_shared_memory_are_not_exchanged() {
     unsafe {
         assert!(message(cmd.acquire_external_buffer(*buffer)).contains("no shared memory"));
         assert!(message(cmd.acquire_external_texture(*texture, SOURCE)).contains("no shared memory"));
+    }
+}
+
+#[test]
+fn textures_are_acquired_on_the_graphics_queue_only() {
+    let Some(ctx) = device() else { return };
+    let texture = ctx.create_texture(&texture_desc()).unwrap();
+    for queue in [Queue::Compute, Queue::Transfer] {
+        let mut cmd = ctx.acquire_command_buffer_on(queue).unwrap();
+        // SAFETY: it is refused.
+        let refused = unsafe { cmd.acquire_external_texture(*texture, SOURCE) };
+        assert!(matches!(refused, Err(Error::WrongQueue { .. })), "{refused:?}");
     }
 }
 

@@ -540,6 +540,34 @@ fn a_context_waits_for_its_own_queues_only() {
     assert_eq!(DEVICE_WAITS.load(Ordering::Relaxed), 0);
 }
 
+/// The driver says of itself that it has Vulkan 1.2.
+#[test]
+fn a_device_of_an_older_vulkan_is_refused() {
+    unsafe extern "system" fn older(_: vk::PhysicalDevice, properties: *mut vk::PhysicalDeviceProperties) {
+        let api_version = vk::API_VERSION_1_2;
+        // SAFETY: the caller gives a structure to write to.
+        unsafe { properties.write(vk::PhysicalDeviceProperties { api_version, ..Default::default() }) };
+    }
+    let Some(engine) = Engine::new() else { return };
+    let handle = engine.instance.raw.handle();
+    let find = |name: &CStr| {
+        if name == c"vkGetPhysicalDeviceProperties" {
+            return older as *const c_void;
+        }
+        // SAFETY: the instance is alive.
+        let found = unsafe { engine.instance.entry.get_instance_proc_addr(handle, name.as_ptr()) };
+        found.map_or(std::ptr::null(), |function| function as *const c_void)
+    };
+    // SAFETY: the functions are those of the instance, and one of the same signature.
+    let instance = unsafe { ash::Instance::load_with(find, handle) };
+    let raw = RawContext { instance, ..engine.raw() };
+    // SAFETY: the device is refused before anything is made.
+    match unsafe { Context::from_raw(raw, &ContextDesc::default()) } {
+        Err(Error::NoDevice { candidates, .. }) => assert_eq!(candidates[0].missing, ["Vulkan 1.3"]),
+        other => unreachable!("{other:?}"),
+    }
+}
+
 #[test]
 fn wrong_descriptions_are_refused() {
     let Some(engine) = Engine::new() else { return };
@@ -587,6 +615,17 @@ fn wrong_descriptions_are_refused() {
         import(image, TextureDesc { data: Some(&[0; 64]), ..texture_desc() }, layout, "has its contents");
         import(image, TextureDesc { extent: [0, 4], ..texture_desc() }, layout, "needs texels");
     }
+    let refused = |desc: TextureDesc<'_>| {
+        // SAFETY: as above.
+        let made = unsafe { ctx.import_texture(&ImportedTexture { image, desc, layout, concurrent: false }) };
+        made.map(drop).unwrap_err()
+    };
+    let error = refused(TextureDesc { extent: [u32::MAX, 4], ..texture_desc() });
+    assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+    // The description of the device lists no `LocalRead`.
+    let usage = TextureUsage::TARGET | TextureUsage::INPUT;
+    let error = refused(TextureDesc { format: Format::Rgba32Float, usage, ..texture_desc() });
+    assert!(matches!(error, Error::Unsupported { .. }), "{error}");
     let empty = ImportedBuffer {
         buffer: vk::Buffer::null(),
         size_bytes: 4,

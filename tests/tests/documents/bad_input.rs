@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::LazyLock;
 
+use crate::glossary::files;
 use crate::held_by::{cells, project};
 
 pub const PAGE: &str = include_str!("../../../docs/bad-input.md");
@@ -15,6 +16,12 @@ pub const CRATES: &str = "\n## Models and interfaces\n";
 pub const INTERFACE: &str = include_str!("../../../lvk/public-api.txt");
 /// The title of the section about values that every call takes.
 const CLAMPED: &str = "\n## Values that are clamped\n";
+/// The title of the list of calls without rows.
+const WITHOUT_ROWS: &str = "Calls that no input makes fail";
+/// The title of the list of errors of other causes than input.
+const OTHER_CAUSES: &str = "Errors of other causes";
+/// The title of the list of calls that have rows, but none of an error that their docstrings name.
+const NO_DRIVER: &str = "Errors that no driver at hand makes";
 const ERRORS: &str = include_str!("../../../lvk/src/error/mod.rs");
 /// Handles of objects. A submission has none.
 const HANDLES: [&str; 12] = [
@@ -80,6 +87,13 @@ struct Row<'a> {
     tests: Vec<&'a str>,
 }
 
+impl<'a> Row<'a> {
+    /// Returns each call with each error.
+    fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
+        self.calls.iter().flat_map(move |call| self.errors.iter().map(move |error| (*call, *error)))
+    }
+}
+
 /// A function of the public interface.
 #[derive(Debug, PartialEq)]
 pub struct Call<'a> {
@@ -128,10 +142,25 @@ fn rows(page: &str) -> Result<Vec<Row<'_>>, String> {
 
 /// Returns the names that begin the items of the list below a title.
 pub fn list<'a>(page: &'a str, title: &str) -> Vec<&'a str> {
+    items(page, title).concat()
+}
+
+/// Returns the names that begin each item of the list below a title.
+fn items<'a>(page: &'a str, title: &str) -> Vec<Vec<&'a str>> {
     let (_, section) = page.split_once(&format!("\n## {title}\n")).unwrap();
     let section = section.split("\n## ").next().unwrap();
     let items = section.lines().filter_map(|line| line.strip_prefix("- "));
-    items.flat_map(|item| quoted(item.split(": ").next().unwrap())).collect()
+    items.map(|item| quoted(item.split(": ").next().unwrap())).collect()
+}
+
+/// Returns the calls of the list of errors that no driver makes, each with the error, which is the last name of its item.
+fn without_driver(page: &str) -> BTreeSet<(&str, &str)> {
+    let mut found = BTreeSet::new();
+    for item in items(page, NO_DRIVER) {
+        let (error, calls) = item.split_last().unwrap();
+        found.extend(calls.iter().map(|call| (*call, *error)));
+    }
+    found
 }
 
 /// Returns the functions that return `lvk::Result`.
@@ -235,6 +264,73 @@ fn function_name(line: &str) -> Option<&str> {
     (qualifiers.contains(&before) && !name.starts_with('$')).then_some(name)
 }
 
+/// Returns the public functions of a source, each with the errors that the section `# Errors` of its docstring names.
+fn documented_errors(source: &str) -> Vec<(String, &str)> {
+    let (mut found, mut owner, mut docs) = (Vec::new(), "", Vec::new());
+    for line in source.split("#[cfg(test)]\nmod tests").next().unwrap_or_default().lines() {
+        owner = implemented_type(line).unwrap_or(owner);
+        let text = line.trim();
+        if let Some(text) = text.strip_prefix("///") {
+            docs.push(text.trim());
+            continue;
+        }
+        if let Some(name) = text.strip_prefix("pub ").and_then(function_name) {
+            let call = if line == text { name.to_owned() } else { format!("{owner}::{name}") };
+            found.extend(linked_errors(&docs).into_iter().map(|error| (call.clone(), error)));
+        }
+        // Attributes stand between a docstring and its function.
+        if !text.starts_with("#[") {
+            docs.clear();
+        }
+    }
+    found
+}
+
+/// Returns the type of the `impl` block that a line begins.
+fn implemented_type(line: &str) -> Option<&str> {
+    let head = line.strip_prefix("impl")?;
+    let head = if head.starts_with('<') { head.split_once("> ")?.1 } else { head };
+    words(head.rsplit(" for ").next()?).next()
+}
+
+/// Returns the variants of `Error` that the section `# Errors` of a docstring links.
+fn linked_errors<'a>(docs: &[&'a str]) -> Vec<&'a str> {
+    let section = docs.iter().copied().skip_while(|line| *line != "# Errors").skip(1);
+    let section = section.take_while(|line| !line.starts_with("# "));
+    let links = section.flat_map(|line| line.split("](").skip(1)).filter_map(|link| link.split(')').next());
+    let names = links.filter_map(|link| {
+        ["Error::", "crate::Error::", "Self::"].into_iter().find_map(|path| link.strip_prefix(path))
+    });
+    // The others are functions.
+    names.filter(|name| name.starts_with(|letter: char| letter.is_ascii_uppercase())).collect()
+}
+
+/// Returns what is wrong with a page about the errors that docstrings name: those that neither a row nor a list has, and entries of
+/// the list of errors that no driver makes which have a row, or which no docstring names.
+fn disagreements(page: &str, documented: &[(String, &str)]) -> Vec<String> {
+    let rows = rows(page).unwrap();
+    let of_rows: BTreeSet<_> = rows.iter().flat_map(Row::pairs).collect();
+    let (without_rows, of_others) = (list(page, WITHOUT_ROWS), list(page, OTHER_CAUSES));
+    let (without_driver, mut known) = (without_driver(page), BTreeSet::new());
+    let mut found = Vec::new();
+    for (call, error) in documented {
+        let pair = (call.as_str(), *error);
+        let has_reason = without_rows.contains(&pair.0) || of_others.contains(&pair.1);
+        if known.insert(pair) && !has_reason && !of_rows.contains(&pair) && !without_driver.contains(&pair) {
+            found.push(format!("the docstring of {call} names {error}, and it has no row"));
+        }
+    }
+    for pair in without_driver {
+        if of_rows.contains(&pair) {
+            found.push(format!("{pair:?} is in a row and in the list"));
+        }
+        if !known.contains(&pair) {
+            found.push(format!("{pair:?} is in the list and in no docstring"));
+        }
+    }
+    found
+}
+
 /// Returns the text of a test and of every function of its file that the text names, and so on.
 pub fn reached_text(source: &str, name: &str) -> String {
     let functions = functions(source);
@@ -310,7 +406,7 @@ fn assert_none<T: std::fmt::Debug>(what: &str, wrong: &[T]) {
 #[test]
 fn every_fallible_call_has_a_row_or_a_reason() {
     let rows = rows(PAGE).unwrap();
-    let by_shortage: BTreeSet<_> = list(PAGE, "Calls that no input makes fail").into_iter().collect();
+    let by_shortage: BTreeSet<_> = list(PAGE, WITHOUT_ROWS).into_iter().collect();
     let with_rows: BTreeSet<_> = rows.iter().flat_map(|row| &row.calls).copied().collect();
     let calls = fallible_calls();
     assert!(calls.len() > 150, "{} calls", calls.len());
@@ -325,12 +421,22 @@ fn every_fallible_call_has_a_row_or_a_reason() {
 fn every_error_has_a_row_or_a_reason() {
     let rows = rows(PAGE).unwrap();
     let with_rows: BTreeSet<_> = rows.iter().flat_map(|row| &row.errors).copied().collect();
-    let without: BTreeSet<_> = list(PAGE, "Errors of other causes").into_iter().collect();
+    let without: BTreeSet<_> = list(PAGE, OTHER_CAUSES).into_iter().collect();
     let known: BTreeSet<_> = variants(ERRORS).into_iter().collect();
     let named: BTreeSet<_> = with_rows.union(&without).copied().collect();
     assert_none("without a row", &known.difference(&named).collect::<Vec<_>>());
     assert_none("no such error", &named.difference(&known).collect::<Vec<_>>());
     assert_none("in a row and in the list", &with_rows.intersection(&without).collect::<Vec<_>>());
+}
+
+#[test]
+fn every_error_that_a_docstring_names_has_a_row() {
+    let calls: BTreeSet<_> = fallible_calls().into_iter().map(|call| call.name).collect();
+    let sources = files("lvk/src", ".rs");
+    let documented = sources.iter().flat_map(|(_, text)| documented_errors(text));
+    let documented: Vec<_> = documented.filter(|(call, _)| calls.contains(call)).collect();
+    assert!(documented.len() > 100, "{} errors", documented.len());
+    assert_none("errors of docstrings", &disagreements(PAGE, &documented));
 }
 
 #[test]
@@ -404,6 +510,75 @@ fn wrong_entries_are_noticed() {
     }
     assert!(rows("| `a` | b | `c` |").is_err() && rows("| `a` | | `C` | `d::e` |").is_err());
     assert_eq!(rows("| call | wrong | error | test |\n|---|---|---|---|\n").unwrap().len(), 0);
+}
+
+/// A source with functions that link errors in the three ways, and in no section of errors.
+const DOCUMENTED: &str = "
+/// # Errors
+/// [`Shader`](crate::Error::Shader).
+pub fn free() {}
+
+impl Other for Heap {
+    /// # Errors
+    /// [`File`](Error::File).
+    fn hidden() {}
+}
+
+impl<H: Destroy> Holder<H> {
+    /// Unlike [`File`](Error::File).
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for one; as [`other`](Self::other), and
+    /// [`Unsupported`](Self::Unsupported).
+    ///
+    /// # Examples
+    /// [`File`](Error::File).
+    #[must_use]
+    pub unsafe fn taken(
+        self,
+    ) -> Result<()> {
+    }
+
+    pub const fn undocumented() {}
+}
+
+#[cfg(test)]
+mod tests {
+    /// # Errors
+    /// [`File`](Error::File).
+    pub fn later() {}
+}
+";
+
+#[test]
+fn errors_of_docstrings_are_read() {
+    let of = |call: &str, error| (call.to_owned(), error);
+    let expected =
+        [of("free", "Shader"), of("Holder::taken", "InvalidUsage"), of("Holder::taken", "Unsupported")];
+    assert_eq!(documented_errors(DOCUMENTED), expected);
+    let types = ["impl A {", "impl<'a, T: B> C<'a, T> {", "impl D for E<'_> {", "    impl F {", "fn g() {}"];
+    assert_eq!(types.map(implemented_type), [Some("A"), Some("C"), Some("E"), None, None]);
+}
+
+#[test]
+fn errors_of_docstrings_without_a_row_are_noticed() {
+    let documented = documented_errors(DOCUMENTED);
+    let wrong = |row: &str, without_rows: &str, without_driver: &str| {
+        let lists = [(WITHOUT_ROWS, without_rows), (OTHER_CAUSES, "`Shader`"), (NO_DRIVER, without_driver)];
+        let lists = lists.map(|(title, item)| format!("\n## {title}\n\n- {item}: a reason\n"));
+        disagreements(&format!("{row}\n{}", lists.concat()), &documented)
+    };
+    let both = "| `Holder::taken` | all | `InvalidUsage`, `Unsupported` | `a::b` |";
+    let one = "| `Holder::taken`, `free` | all | `InvalidUsage` | `a::b` |";
+    let unlisted = "`A::b`, `Vulkan`";
+    assert_none("in the list of calls", &wrong("", "`Holder::taken`", "`Holder::taken`, `Unsupported`"));
+    assert_none("in the list of errors", &wrong(one, "`A::b`", "`Holder::taken`, `Unsupported`"));
+    let missing = "the docstring of Holder::taken names Unsupported, and it has no row";
+    let needless = "(\"A::b\", \"Vulkan\") is in the list and in no docstring";
+    assert_eq!(wrong(one, "`A::b`", unlisted), [missing, needless]);
+    assert_eq!(wrong(both, "`A::b`", unlisted), [needless]);
+    let twice = "(\"Holder::taken\", \"Unsupported\") is in a row and in the list";
+    assert_eq!(wrong(both, "`A::b`", "`Holder::taken`, `Unsupported`"), [twice]);
 }
 
 #[test]

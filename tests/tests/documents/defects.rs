@@ -9,7 +9,7 @@ use crate::held_by::{cells, project};
 
 /// Returns the sweeps of a source in the table of a macro, such as `whole_threads: "threads";`.
 fn sweeps_of(source: &str) -> impl Iterator<Item = &str> {
-    let names = source.lines().filter_map(|line| line.trim_start().split_once(": \""));
+    let names = source.lines().filter_map(|line| line.trim_start().split_once(": "));
     names.map(|(name, _)| name).filter(|name| name.starts_with("whole_"))
 }
 

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ColorAttachment, Context, DeviceProfile, Format, Holder, OptionalFeature, RenderPass, RenderPassDesc,
-    RenderPipelineDesc, RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage, ShadingRate,
-    ShadingRateAttachment, ShadingRateCombiner, ShadingRateLimits, TextureDesc, TextureHandle, TextureKind,
-    TextureUsage,
+    ColorAttachment, Context, DeviceProfile, FeatureSet, Format, Holder, OptionalFeature, RenderPass,
+    RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage,
+    ShadingRate, ShadingRateAttachment, ShadingRateCombiner, ShadingRateLimits, TextureDesc, TextureHandle,
+    TextureKind, TextureUsage,
 };
 use lvk_tests::raster::{
     COVER, PAINT, has, paint, pixels, run_pass, staged_pipeline, target, unsupported, usage_error,
@@ -228,6 +228,29 @@ fn wrong_rates_are_refused() {
         pass.bind_render_pipeline(*made)?;
         usage_error(pass.shading_rate(ShadingRate::new([1, 8])), "not [1, 8]");
         pass.shading_rate(ShadingRate::new([1, 1]))
+    });
+}
+
+/// Under a profile that hides the rates of primitives and attachments.
+#[test]
+fn combinations_that_the_device_lacks_are_refused() {
+    let hidden = FeatureSet::NONE
+        .with(OptionalFeature::PrimitiveShadingRate)
+        .with(OptionalFeature::AttachmentShadingRate);
+    let profile = DeviceProfile { name: "rates of draws".into(), hidden, ..Default::default() };
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
+    if !has(&ctx, OptionalFeature::PipelineShadingRate) {
+        return;
+    }
+    let pipeline = pipeline(&ctx, COVER, ShadingRate::default());
+    drawn(&ctx, None, |pass| {
+        pass.bind_render_pipeline(*pipeline)?;
+        let (replace, keep) = (ShadingRateCombiner::Replace, ShadingRate::default());
+        let by_primitive = ShadingRate { primitive: replace, ..keep };
+        unsupported(pass.shading_rate(by_primitive), OptionalFeature::PrimitiveShadingRate.vulkan_name());
+        let by_attachment = ShadingRate { attachment: replace, ..keep };
+        unsupported(pass.shading_rate(by_attachment), OptionalFeature::AttachmentShadingRate.vulkan_name());
+        pass.shading_rate(keep)
     });
 }
 

@@ -248,4 +248,12 @@ fn state_that_cannot_be_is_refused() {
     ] {
         unsupported(make(&bare, COVER, &desc), lack);
     }
+    let unbounded = make(&bare, COVER, &with_bias(DepthBias::default())).unwrap();
+    let drawn = target(&bare, Format::R32Float, [1, 1]);
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    run_pass(&bare, &RenderPassDesc { color: &color, ..Default::default() }, |pass| {
+        pass.bind_render_pipeline(*unbounded)?;
+        unsupported(pass.depth_bias(DepthBias { clamp: 1.0, ..Default::default() }), "depthBiasClamp");
+        pass.depth_bias(DepthBias { slope: 1.0, ..Default::default() })
+    });
 }

@@ -1,17 +1,19 @@
 //! Compaction: an asynchronous second step that keeps the handle and its references, and frees memory.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
-use lvk::test_hooks::{before_next_command_buffer, waiting_objects};
+use lvk::test_hooks::{before_next_command_buffer, set_out_of_memory, waiting_objects, with_fault_injection};
 use lvk::{
-    AccelStructHandle, BuildFlags, BuildMode, Compaction, Context, DeviceInstances, Error, Result, TlasDesc,
+    AccelStructHandle, BufferDesc, BuildFlags, BuildMode, Compaction, Context, DeviceInstances, Error,
+    MemoryKind, Result, TlasDesc,
 };
 use lvk_tests::accel_backend::{builds_device_accel_structs, requires_device_accel_structs};
 use lvk_tests::compute::words_buffer;
-use lvk_tests::device;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
 use lvk_tests::vertex_deform::{VertexDeformer, deformed};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
+use lvk_tests::{device, without_software};
 
 pub(super) const COMPACTABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_COMPACTION);
 const MOVING: BuildFlags = COMPACTABLE.union(BuildFlags::ALLOW_UPDATE);
@@ -484,6 +486,42 @@ fn a_context_may_go_meanwhile() -> Result<()> {
         assert!(sink.is_empty(), "{steps} submissions: {:?}", sink.messages());
     }
     Ok(())
+}
+
+/// A TLAS keeps referencing replaced BLAS where memory to write it again lacks. The next submission tries again, and the replaced
+/// memory is freed.
+#[test]
+fn a_tlas_that_could_not_be_written_again_is_written_later() -> Result<()> {
+    capture_warnings();
+    let Some(ctx) = with_fault_injection(|| without_software(|_| ())) else { return Ok(()) };
+    if !requires_device_accel_structs(&ctx, "copies of structures") {
+        return Ok(());
+    }
+    let model = vec![Part::new(Mesh::torus(10), Layout::Indexed16)];
+    let place = |index: u32| Placed::new(0, Affine3A::from_translation(Vec3::X * (3 * index) as f32));
+    let scene = RayScene { models: vec![model], placed: (0..6).map(place).collect() };
+    let gpu = scene.upload_with(&ctx, COMPACTABLE, BuildFlags::FAST_TRACE, 6)?;
+    let other = scene.upload_with(&ctx, BuildFlags::FAST_TRACE, BuildFlags::FAST_TRACE, 6)?;
+    ctx.wait_idle()?;
+    let needed = memory(&ctx).0;
+    ctx.compact(&handles(&gpu))?;
+    ctx.wait_idle()?;
+    waiting_objects(&ctx)?;
+    // Memory for what the kernel reads that writes the instances again is full: first the block, then the pages in it.
+    set_out_of_memory(true);
+    let filler = BufferDesc { size_bytes: 64 << 10, memory: MemoryKind::Readback, ..Default::default() };
+    let fillers: Vec<_> = std::iter::from_fn(|| ctx.create_buffer(&filler).ok()).collect();
+    let mut full = ctx.acquire_command_buffer()?;
+    let placed = instances(&scene.placed, &other.models);
+    while full.update_tlas(*other.tlas, &placed, BuildMode::Rebuild).is_ok() {}
+    ctx.flush()?;
+    set_out_of_memory(false);
+    assert_eq!(take_warnings("the next submission tries again").len(), 1);
+    drop((full, fillers));
+    wait_for_compaction(&ctx)?;
+    let (before_bytes, after_bytes) = done(&ctx, *gpu.models[0])?;
+    assert_eq!(memory(&ctx).0, needed - before_bytes + after_bytes);
+    HitCheck::new(&ctx)?.scene("written later", &gpu.tlas, &scene)
 }
 
 /// Compactions of one thread are carried out by whatever thread submits next.

@@ -112,6 +112,8 @@ fn geometry_that_does_not_fit_its_buffers_is_refused() -> Result<()> {
         ("vertex stride in bytes", Triangles { vertex_stride: u64::MAX - 3, ..good }),
         ("few vertices", Triangles { vertex_stride: 1 << 31, ..good }),
         ("5 triangles need three vertices", Triangles { triangle_count: 5, ..good }),
+        // At the end of the buffer, as no vertex is before it.
+        ("need at least one vertex", Triangles { vertex_count: 0, vertex_offset: 36 * 4, ..indexed }),
         ("wrong", Triangles { triangle_count: u32::MAX, ..good }),
         ("ACCEL_INPUT", Triangles { vertex_buffer: *storage, ..good }),
         ("few indices", Triangles { triangle_count: 3, ..indexed }),

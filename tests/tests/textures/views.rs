@@ -7,9 +7,9 @@ use lvk::{
     TextureKind, TextureRange, TextureRegion, TextureUsage, TextureViewDesc,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline};
-use lvk_tests::device;
 use lvk_tests::noise::noise;
 use lvk_tests::raster::{COVER, render_pipeline};
+use lvk_tests::{device, device_with};
 
 const SHADERS: TextureUsage = TextureUsage::SAMPLED.union(TextureUsage::STORAGE);
 
@@ -523,6 +523,20 @@ fn impossible_views_are_typed_errors() {
         usage_error(ctx.create_texture(&desc), &["texels of"]);
     }
     assert!(ctx.create_texture_view(&TextureViewDesc { texture: Some(*square), ..none }).is_ok());
+}
+
+/// Views take slots as textures do, and free them.
+#[test]
+fn running_out_of_slots_for_views_is_an_error_that_passes() {
+    let Some(ctx) = device_with(|desc| desc.max_textures = 4) else { return };
+    let base = texture(&ctx, &TextureDesc { mips: 1, ..Default::default() });
+    let views = [(); 2].map(|()| one_mip(&ctx, *base, 0));
+    let desc = TextureViewDesc { texture: Some(*base), debug_name: "one too many", ..Default::default() };
+    let error = ctx.create_texture_view(&desc).unwrap_err();
+    assert!(matches!(&error, Error::LimitExceeded { object, .. } if object == "one too many"), "{error}");
+    drop(views);
+    ctx.wait_idle().unwrap();
+    assert!(ctx.create_texture_view(&desc).is_ok());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::fallbacks::Instead;
 use super::verdict::RunOutcome;
 use crate::call_log::Call;
-use crate::fault::{Fault, FaultError, PROGRESS, Span};
+use crate::fault::{Fault, FaultError, PRESENTED, PROGRESS, Span};
 
 /// True if the calls of a run with `fault` show what the library does in place of the calls of `command` that have failed.
 pub(super) fn is_seen(
@@ -25,6 +25,7 @@ pub(super) fn is_seen(
         Instead::CallsAgain | Instead::AllocatesAgain | Instead::AsksAgain => {
             count(found, |call| call.command == command && call.fails) > 1
         }
+        Instead::AsksForPresents => asks_for_presents(command, &found.calls),
         Instead::BeginsLater => found.unready.is_empty(),
         Instead::WaitsOtherwise => waits_otherwise(command, fault.error, &found.calls),
         Instead::RemakesSwapchain => remakes_swapchain(command, &found.calls),
@@ -47,6 +48,14 @@ fn is_called_again_at_once(command: &str, calls: &[Call]) -> bool {
 fn is_followed_by_success(command: &str, calls: &[Call]) -> bool {
     let last = |fails: bool| calls.iter().rposition(|call| call.command == command && call.fails == fails);
     last(true) < last(false)
+}
+
+/// True if no image is presented behind the last wait of `command` that has failed, and a question about a present has succeeded behind it.
+fn asks_for_presents(command: &str, calls: &[Call]) -> bool {
+    let last = |is_meant: &dyn Fn(&Call) -> bool| calls.iter().rposition(is_meant);
+    let failure = last(&|call| call.fails && call.command == command);
+    let answer = last(&|call| !call.fails && call.command == PRESENTED);
+    last(&|call| call.command == "vkQueuePresentKHR") < failure && failure < answer
 }
 
 /// True if no more work follows the wait of `command` that has failed, and a wait or a question about the progress of work has
@@ -144,6 +153,16 @@ mod tests {
         let lost = |found: &str| waits_otherwise(wait, FaultError::DeviceLost, &calls(found));
         assert!(lost("vkQueueSubmit2 vkQueueWaitIdle!"), "a lost device has no work");
         assert!(!lost("vkQueueWaitIdle! vkQueueSubmit2"));
+    }
+
+    #[test]
+    fn presents_are_asked_for_where_they_cannot_be_waited_for() {
+        let asks = |found: &str| seen(Instead::AsksForPresents, "vkWaitForFences", Span::Stays, found, "");
+        assert!(asks("vkQueuePresentKHR vkWaitForFences! vkGetFenceStatus"));
+        assert!(asks("vkQueuePresentKHR vkWaitForFences! vkGetFenceStatus! vkGetFenceStatus"));
+        assert!(!asks("vkQueuePresentKHR vkWaitForFences! vkGetFenceStatus!"));
+        assert!(!asks("vkQueuePresentKHR vkGetFenceStatus vkWaitForFences!"));
+        assert!(!asks("vkWaitForFences! vkQueuePresentKHR vkGetFenceStatus"), "another frame");
     }
 
     #[test]

@@ -23,6 +23,8 @@ pub enum Instead {
     AllocatesAgain,
     /// A question about the progress of work that is asked again later.
     AsksAgain,
+    /// The end of a swapchain asks whether its presents have ended.
+    AsksForPresents,
     /// The command buffer that was to be begun ahead is begun by the next acquisition, or not needed.
     BeginsLater,
     /// The end of a context learns in another way that its work has ended.
@@ -35,7 +37,8 @@ pub enum Instead {
 
 use FaultError::{DeviceLost, DeviceMemory, HostMemory, NoAddress, OutOfDate, SurfaceLost};
 use Instead::{
-    AllocatesAgain, AsksAgain, BeginsLater, CallsAgain, LosesName, RemakesSwapchain, WaitsOtherwise,
+    AllocatesAgain, AsksAgain, AsksForPresents, BeginsLater, CallsAgain, LosesName, RemakesSwapchain,
+    WaitsOtherwise,
 };
 
 const fn fallback(command: &'static str, errors: &'static [FaultError], instead: Instead) -> Fallback {
@@ -55,6 +58,8 @@ pub const FALLBACKS: &[Fallback] = &[
     fallback("vkCreateAccelerationStructureKHR", &[DeviceMemory], CallsAgain),
     fallback("vkQueueWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], WaitsOtherwise),
     fallback("vkGetSemaphoreCounterValue", &[HostMemory, DeviceMemory], AsksAgain),
+    fallback("vkWaitForFences", &[HostMemory, DeviceMemory], AsksForPresents),
+    fallback("vkGetFenceStatus", &[HostMemory, DeviceMemory], AsksAgain),
     fallback("vkSetDebugUtilsObjectNameEXT", &[HostMemory, DeviceMemory], LosesName),
     fallback("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfaceCapabilities2KHR", &[SurfaceLost], CallsAgain),

@@ -90,8 +90,8 @@ const KINDS: &[(&[&str], &[&str])] = &[
 
 /// Kinds of objects that have memory.
 const WITH_MEMORY: &[&str] = &["BUFFER", "ACCELERATION_STRUCTURE_KHR", "MICROMAP_EXT", "IMAGE"];
-/// Kinds of objects that are read back.
-const READABLE: &[&str] = &["BUFFER", "IMAGE", "IMAGE_VIEW"];
+/// Kinds of objects that are written and read back.
+const FILLED: &[&str] = &["BUFFER", "IMAGE", "IMAGE_VIEW", "ACCELERATION_STRUCTURE_KHR"];
 const SWAPCHAIN: &str = "SWAPCHAIN_KHR";
 
 /// Returns the kinds of named objects that an error of a command may name.
@@ -102,8 +102,8 @@ fn kinds_of(command: &str) -> &'static [&'static str] {
     fitting.max_by_key(|(length, ..)| *length).map_or(&[], |(_, kinds, _)| kinds)
 }
 
-/// Start of the names that the library makes of the name of another object.
-const READ_BACK: &str = "readback of ";
+/// Starts of the names that the library makes of the name of another object.
+const SERVING: [&str; 2] = ["readback of ", "staging of "];
 
 /// Start of the commands that ask for a format, by its name in the library.
 const FORMAT_QUERY: &str = "vkGetPhysicalDeviceImageFormatProperties";
@@ -157,12 +157,12 @@ impl<'a> KnownObjects<'a> {
     fn start(&self, command: &str, quoted: &str) -> bool {
         let concerns = |starts: &[&str]| starts.iter().any(|start| command.starts_with(start));
         let is_named = self.of_kinds(kinds_of(command)).any(|name| starts_with(quoted, name));
-        let source = quoted.strip_prefix(READ_BACK).filter(|_| concerns(MEMORY));
-        let is_readback =
-            source.is_some_and(|source| self.of_kinds(READABLE).any(|name| starts_with(source, name)));
+        let mut served =
+            SERVING.iter().filter_map(|start| quoted.strip_prefix(start)).filter(|_| concerns(MEMORY));
+        let serves_named = served.any(|owner| self.of_kinds(FILLED).any(|name| starts_with(owner, name)));
         let is_unnamed = |(name, starts): &(&str, &[&str])| concerns(starts) && starts_with(quoted, name);
         is_named
-            || is_readback
+            || serves_named
             || concerns(PHYSICAL_DEVICE) && self.devices.iter().any(|name| starts_with(quoted, name))
             || UNNAMED_OBJECTS.iter().any(is_unnamed)
             || command.starts_with(FORMAT_QUERY)
@@ -207,6 +207,7 @@ mod tests {
             ("vkCreateImageView", " for 'the sky's colour'"),
             ("vkCreateImageView", " for 'main'"),
             ("vkMapMemory", " for 'readback of rain'"),
+            ("vkCreateBuffer", " for 'staging of rain'"),
             ("vkGetQueryPoolResults", " for 'birch'"),
             ("vkQueueSubmit2", " for 'compute queue'; create a new context"),
             ("vkCreateDevice", " for 'llvmpipe'"),
@@ -230,6 +231,7 @@ mod tests {
             ("vkQueueSubmit2", " for 'rain'"),
             ("vkCreateImage", " for 'Rgba8Unorm'"),
             ("vkCreateImage", " for 'readback of rain'"),
+            ("vkCreateBuffer", " for 'staging of snow'"),
             ("vkMapMemory", " for 'readback of snow'"),
             ("vkGetPipelineCacheData", " for '/var/run/other'"),
             ("vkCreateBuffer", " for '/var/run/caches/pipelines'"),

@@ -73,7 +73,7 @@ fn losses_are_told_with_their_fault() {
     for line in ["device_fault", "queues", "blas"] {
         assert_losses_are_explained(line, program(line), &losses(8));
     }
-    let Some((_connection, _display, program)) = in_window() else { return };
+    let Some((_connection, _display, program)) = in_window(program("window")) else { return };
     assert_losses_are_explained("window", program, &losses(16));
 }
 
@@ -85,7 +85,7 @@ fn losses_that_lacked_their_fault_have_it() {
         assert!(error_line(&outcome).contains("injected page fault"), "{fault}: {}", outcome.stderr);
     };
     assert_explained(program("blas"), "vkGetQueryPoolResults 2 device-lost once");
-    let Some((_connection, _display, program)) = in_window() else { return };
+    let Some((_connection, _display, program)) = in_window(program("window")) else { return };
     assert_explained(program, "vkCreateSwapchainKHR 1 device-lost once");
 }
 
@@ -95,6 +95,6 @@ fn whole_losses_are_told_with_their_fault() {
     for line in ["device_fault", "queues", "threads", "blas", "blas_software", "hot_reload"] {
         assert_losses_are_explained(line, program(line), &losses(usize::MAX));
     }
-    let Some((_connection, _display, program)) = in_window() else { return };
+    let Some((_connection, _display, program)) = in_window(program("window")) else { return };
     assert_losses_are_explained("window", program, &losses(usize::MAX));
 }

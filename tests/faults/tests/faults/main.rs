@@ -26,20 +26,29 @@ fn program(line: &str) -> Program {
     Program { path, args, variables: Vec::new(), caches: Caches::Warm, tries_again: true }
 }
 
+/// Variable of scenarios that run with the validation layer.
+const VALIDATES: &str = "LVK_FAULT_VALIDATE";
+
 /// Returns a program with the validation layer: samples have an argument for it, scenarios a variable.
 fn validated(line: &str) -> Program {
     let mut program = program(line);
     match line.contains("--frames") {
         true => program.args.push("--validate".to_owned()),
-        false => program.variables.push(("LVK_FAULT_VALIDATE".to_owned(), "1".to_owned())),
+        false => program.variables.push((VALIDATES.to_owned(), "1".to_owned())),
     }
     program
 }
 
+/// True for the programs of [`validated`].
+fn is_validated(program: &Program) -> bool {
+    program.args.iter().any(|word| word == "--validate")
+        || program.variables.iter().any(|(name, _)| name == VALIDATES)
+}
+
 /// Asserts that a program which [`validated`] returns has the validation layer: the library listens to its messages.
-fn assert_validated(line: &str) {
-    let listens = clean(validated(line)).count("vkCreateDebugUtilsMessengerEXT");
-    assert!(listens > 0, "{line} runs without the validation layer");
+fn assert_validated(program: &CleanProgram) {
+    let listens = program.count("vkCreateDebugUtilsMessengerEXT");
+    assert!(listens > 0, "the program runs without the validation layer");
 }
 
 /// True for the scenario whose number of calls differs from run to run, by the order of its threads, so that a few faults are not reached.
@@ -58,9 +67,9 @@ fn draws_to_virtual_displays() -> bool {
     draws
 }
 
-/// Returns the scenario in a window, the X server that shows it, and a connection: without one the server ends with the first
+/// Returns a program in a window, the X server that shows it, and a connection: without one the server ends with the first
 /// program.
-fn in_window() -> Option<(RustConnection, VirtualDisplay, Program)> {
+fn in_window(mut program: Program) -> Option<(RustConnection, VirtualDisplay, Program)> {
     if !draws_to_virtual_displays() {
         return None;
     }
@@ -73,10 +82,11 @@ fn in_window() -> Option<(RustConnection, VirtualDisplay, Program)> {
         }
     };
     let text = |value: std::ffi::OsString| value.into_string().unwrap();
-    let variables =
-        display.variables().into_iter().map(|(name, value)| (name.to_owned(), text(value))).collect();
+    program
+        .variables
+        .extend(display.variables().into_iter().map(|(name, value)| (name.to_owned(), text(value))));
     let (connection, _) = RustConnection::connect(Some(display.name())).unwrap();
-    Some((connection, display, Program { variables, ..program("window") }))
+    Some((connection, display, program))
 }
 
 /// Samples in a window, which gets another size after its first frame.

@@ -6,7 +6,9 @@ use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::run::{Program, fault_layer, run};
 use lvk_faults::sweep::verdict::{Ending, Flaw, RunOutcome, flaws};
 
-use crate::{assert_reached, assert_told, clean, error_line, in_window, program, validated};
+use crate::{
+    assert_reached, assert_told, assert_validated, clean, error_line, in_window, program, validated,
+};
 
 /// Faults that a whole sweep found once (docs/defects.md).
 #[test]
@@ -16,7 +18,7 @@ fn faults_that_had_flaws_have_none() {
     for fault in ["vkGetQueryPoolResults 1 device-lost once", "vkCreateQueryPool 1 host-memory once"] {
         assert_reached(&blas, fault);
     }
-    let Some((_connection, _display, program)) = in_window() else { return };
+    let Some((_connection, _display, program)) = in_window(program("window")) else { return };
     let program = clean(program);
     for fault in [
         "vkGetFenceStatus 1 device-lost once",
@@ -24,6 +26,49 @@ fn faults_that_had_flaws_have_none() {
         "vkCreateXcbSurfaceKHR 1 host-memory once",
     ] {
         assert_reached(&program, fault);
+    }
+}
+
+/// A pipeline that is linked from parts is named, not the part.
+#[test]
+fn an_error_of_a_part_names_its_pipeline() {
+    let pipelines = clean(program("pipelines"));
+    let count = pipelines.count("vkCreateGraphicsPipelines");
+    assert!(count > 2, "parts, and their link: {count}");
+    for number in 1..=count {
+        let failed =
+            assert_reached(&pipelines, &format!("vkCreateGraphicsPipelines {number} host-memory once"));
+        let expected = "out of host memory in vkCreateGraphicsPipelines for 'cover'";
+        assert!(error_line(&failed).contains(expected), "{}", failed.stderr);
+    }
+}
+
+/// A semaphore of a present that was not made is destroyed once the work before it has ended, and an image that is acquired and not
+/// presented gives its semaphore back: the validation layer is silent.
+#[test]
+fn semaphores_of_windows_outlive_their_work() {
+    let Some((_connection, _display, program)) = in_window(validated("another_window")) else { return };
+    let program = clean(program);
+    assert_validated(&program);
+    for fault in [
+        "vkQueuePresentKHR 1 host-memory once",
+        "vkQueueSubmit2 10 host-memory once",
+        "vkCreateSwapchainKHR 2 device-lost once",
+        "vkWaitForFences 1 host-memory stays",
+    ] {
+        assert_reached(&program, fault);
+    }
+}
+
+/// A structure that a compaction replaces stays until a copy of it has ended, though the wait for the copy fails.
+#[test]
+fn a_structure_outlives_its_serialisation() {
+    let program = clean(validated("serialize"));
+    assert_validated(&program);
+    let count = program.count("vkWaitSemaphores");
+    assert!(count > 2, "{count}");
+    for number in 1..=count {
+        assert_reached(&program, &format!("vkWaitSemaphores {number} host-memory once"));
     }
 }
 

@@ -31,7 +31,7 @@ fn some_calls_of_the_hybrid_sample_fail() {
 
 #[test]
 fn some_calls_of_scenarios_fail() {
-    for line in ["blas", "threads", "queues", "raw_device", "hot_reload", "interop"] {
+    for line in ["blas", "threads", "queues", "raw_device", "hot_reload", "pipelines", "interop"] {
         assert_no_flaws(line, &program(line), &some(12), SAMPLE / 2);
     }
 }
@@ -39,15 +39,15 @@ fn some_calls_of_scenarios_fail() {
 #[test]
 fn some_calls_fail_above_the_validation_layer() {
     for line in ["queues", "hot_reload"] {
-        assert_validated(line);
+        assert_validated(&clean(validated(line)));
         assert_no_flaws(line, &validated(line), &some(12), SAMPLE / 2);
     }
 }
 
 #[test]
 fn some_calls_of_a_sample_in_a_window_fail() {
-    let Some((_connection, _display, window)) = in_window() else { return };
-    let program = Program { variables: window.variables, tries_again: false, ..program(WINDOWED[0]) };
+    let program = Program { tries_again: false, ..program(WINDOWED[0]) };
+    let Some((_connection, _display, program)) = in_window(program) else { return };
     assert_no_flaws(WINDOWED[0], &program, &some(12), SAMPLE / 2);
 }
 
@@ -60,7 +60,7 @@ fn some_calls_fail_while_caches_are_written() {
 
 #[test]
 fn some_calls_of_a_window_fail() {
-    let Some((_connection, _display, program)) = in_window() else { return };
+    let Some((_connection, _display, program)) = in_window(program("window")) else { return };
     let errors = vec![FaultError::SurfaceLost, FaultError::OutOfDate];
     assert_no_flaws("window", &program, &SweepPlan { errors, stays_out_of_date: true, ..some(12) }, SAMPLE);
 }
@@ -68,7 +68,7 @@ fn some_calls_of_a_window_fail() {
 /// A swapchain that stays out of date is made anew for each frame, and no frame is shown.
 #[test]
 fn frames_of_a_swapchain_that_stays_out_of_date_are_not_shown() {
-    let Some((_connection, _display, program)) = in_window() else { return };
+    let Some((_connection, _display, program)) = in_window(program("window")) else { return };
     let program = clean(program);
     for call in ["vkAcquireNextImageKHR 1", "vkAcquireNextImageKHR 2", "vkQueuePresentKHR 1"] {
         let fault = format!("{call} out-of-date stays");

@@ -14,7 +14,7 @@ use lvk_samples::app::cli::command;
 use lvk_samples::catalogue::SAMPLES;
 use lvk_viewer::Viewer;
 
-use crate::{WINDOWED, assert_validated, in_window, program, validated, varies};
+use crate::{WINDOWED, assert_validated, clean, in_window, is_validated, program, validated, varies};
 
 /// Time of a full sweep.
 const WHOLE: Duration = Duration::from_secs(6 * 3600);
@@ -130,6 +130,8 @@ whole_sweeps! {
     whole_queues: "queues";
     whole_raw_device: "raw_device";
     whole_hot_reload: "hot_reload";
+    whole_pipelines: "pipelines";
+    whole_serialize: "serialize";
     whole_interop: "interop";
 }
 
@@ -171,7 +173,7 @@ macro_rules! validated_sweeps {
         #[test]
         #[ignore = "minutes: .ci/slow faults"]
         fn $test() {
-            assert_validated($line);
+            assert_validated(&clean(validated($line)));
             whole(stringify!($test), $line, &validated($line));
         }
     )*};
@@ -186,6 +188,9 @@ validated_sweeps! {
     whole_validated_threads: "threads";
     whole_validated_queues: "queues";
     whole_validated_hot_reload: "hot_reload";
+    whole_validated_pipelines: "pipelines";
+    whole_validated_serialize: "serialize";
+    whole_validated_raw_device: "raw_device";
     whole_validated_interop: "interop";
 }
 
@@ -227,34 +232,38 @@ cold_sweeps! {
     whole_cold_blas_software: "blas_software";
 }
 
-#[test]
-#[ignore = "minutes: .ci/slow faults"]
-fn whole_window() {
-    let Some((_connection, _display, program)) = in_window() else { return };
-    whole_of("whole_window", "window", &program, &SweepPlan { stays_out_of_date: true, ..whole_plan() });
+/// Declares an ignored test for each program in a window. A swapchain that stays out of date has no end where a program waits for an
+/// image for ever, as samples do.
+macro_rules! window_sweeps {
+    ($($test:ident: $program:expr, $stays_out_of_date:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            whole_in_window(stringify!($test), $program, $stays_out_of_date);
+        }
+    )*};
 }
 
-/// Sweeps a sample in a window: three frames. A process has one event loop, so there is no second try.
-fn whole_of_window(name: &str, line: &str) {
-    let Some((_connection, _display, window)) = in_window() else { return };
-    let program = Program { variables: window.variables, tries_again: false, ..program(line) };
-    whole(name, line, &program);
+window_sweeps! {
+    whole_window: program("window"), true;
+    whole_another_window: program("another_window"), true;
+    whole_window_of_hybrid: sample_in_window(program(WINDOWED[0])), false;
+    whole_window_of_hello_triangle: sample_in_window(program(WINDOWED[1])), false;
+    whole_window_of_viewer: sample_in_window(program(WINDOWED[2])), false;
+    whole_validated_window: validated("window"), true;
+    whole_validated_another_window: validated("another_window"), true;
 }
 
-#[test]
-#[ignore = "minutes: .ci/slow faults"]
-fn whole_window_of_hybrid() {
-    whole_of_window("whole_window_of_hybrid", WINDOWED[0]);
+/// Returns a sample for a window: three frames. A process has one event loop, so there is no second try.
+fn sample_in_window(program: Program) -> Program {
+    Program { tries_again: false, ..program }
 }
 
-#[test]
-#[ignore = "minutes: .ci/slow faults"]
-fn whole_window_of_hello_triangle() {
-    whole_of_window("whole_window_of_hello_triangle", WINDOWED[1]);
-}
-
-#[test]
-#[ignore = "minutes: .ci/slow faults"]
-fn whole_window_of_viewer() {
-    whole_of_window("whole_window_of_viewer", WINDOWED[2]);
+fn whole_in_window(name: &str, program: Program, stays_out_of_date: bool) {
+    let Some((_connection, _display, program)) = in_window(program) else { return };
+    if is_validated(&program) {
+        assert_validated(&clean(program.clone()));
+    }
+    let plan = SweepPlan { stays_out_of_date, ..whole_plan() };
+    whole_of(name, &program.args.join(" "), &program, &plan);
 }

@@ -44,6 +44,25 @@ pub(crate) fn in_software() -> Result<Vec<u8>, Failure> {
     batch(&context(ContextDesc { ray_query: RayQueryRequest::Software, ..Default::default() })?)
 }
 
+/// A BLAS that is serialised while its compaction is under way: its size is known, and the copy comes with the next submission. Returns
+/// the number of bytes.
+pub(crate) fn serialized_in_compaction() -> Result<Vec<u8>, Failure> {
+    let (ray_query, ray_tracing_pipeline) = (RayQueryRequest::Hardware, RayTracingPipelineRequest::Off);
+    let ctx = context(ContextDesc { ray_query, ray_tracing_pipeline, ..Default::default() })?;
+    let positions = positions(&ctx, 0.0)?;
+    let blas = ctx.create_blas(&BlasDesc {
+        geometries: &[BlasGeometry::Triangles(Triangles::packed(*positions, 3 * TRIANGLES))],
+        flags: BuildFlags::FAST_TRACE | BuildFlags::ALLOW_COMPACTION,
+        debug_name: "stripes",
+        ..Default::default()
+    })?;
+    ctx.compact(&[*blas])?;
+    ctx.wait_idle()?;
+    let bytes = ctx.serialize_blas(*blas)?;
+    ctx.wait_idle()?;
+    Ok(bytes.len().to_le_bytes().to_vec())
+}
+
 /// Creates the positions of narrow triangles side by side, in a half of the picture.
 fn positions(ctx: &Context, half: f32) -> lvk::Result<Holder<BufferHandle>> {
     let corners = |index: u32| {

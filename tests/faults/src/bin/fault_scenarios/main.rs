@@ -10,6 +10,7 @@ mod hot_reload;
 #[cfg(target_os = "linux")]
 mod interop;
 mod leak;
+mod pipelines;
 mod queues;
 mod raw_device;
 mod single_file_programs;
@@ -18,6 +19,8 @@ mod threads;
 #[cfg(target_os = "linux")]
 mod window;
 mod windowed;
+#[cfg(target_os = "linux")]
+mod x_window;
 
 use std::error::Error;
 use std::ffi::OsString;
@@ -53,16 +56,20 @@ fn scenario(name: &str) -> Option<Scenario> {
     Some(match name {
         "blas" => blas::on_device,
         "blas_software" => blas::in_software,
+        "serialize" => blas::serialized_in_compaction,
         "threads" => threads::eight,
         "queues" => queues::three,
         "raw_device" => raw_device::guest,
         "hot_reload" => hot_reload::reload,
+        "pipelines" => pipelines::in_background,
         #[cfg(target_os = "linux")]
         "interop" => interop::exchange,
         "device_fault" => device_fault::explained,
         "slow_work" => slow_work::outlives_its_context,
         #[cfg(target_os = "linux")]
         "window" => window::frames_and_resize,
+        #[cfg(target_os = "linux")]
+        "another_window" => window::another_window,
         _ => return None,
     })
 }

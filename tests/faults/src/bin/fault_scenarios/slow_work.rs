@@ -1,16 +1,16 @@
-//! Work that is still under way when its context ends.
+//! Work of the GPU that takes long: it is still under way when its context ends, or when a frame is presented.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use lvk::{
-    BufferDesc, BufferHandle, ComputePipelineDesc, ComputePipelineHandle, Context, ContextDesc, Dependencies,
-    ShaderModuleDesc, ShaderSource, ShaderStage, SubmitHandle,
+    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
+    ContextDesc, Dependencies, Holder, ShaderModuleDesc, ShaderSource, ShaderStage,
 };
 
 use crate::{Failure, context};
 
-/// Seconds that the work takes: more than the end of a context waits for a queue whose waits fail.
-const SECONDS: f64 = 3.0;
+/// More than the end of a context waits for a queue whose waits fail.
+const LONG: Duration = Duration::from_secs(3);
 /// Rounds of the measured dispatch.
 const MEASURED_ROUNDS: u32 = 1 << 20;
 
@@ -32,40 +32,62 @@ struct Push {
     tail: u32,
 }
 
+/// A dispatch that takes a given time.
+pub(crate) struct SlowWork {
+    words: Holder<BufferHandle>,
+    pipeline: Holder<ComputePipelineHandle>,
+    rounds: u32,
+}
+
+impl SlowWork {
+    /// Measures how many rounds take as long as `time`.
+    pub(crate) fn new(ctx: &Context, time: Duration) -> Result<Self, Failure> {
+        let words = ctx.create_buffer(&BufferDesc {
+            size_bytes: 64 * 4,
+            debug_name: "slow words",
+            ..Default::default()
+        })?;
+        let module = ctx.create_shader_module(&ShaderModuleDesc {
+            stage: ShaderStage::Compute,
+            source: ShaderSource::Glsl(SLOW),
+            debug_name: "slow.comp",
+            ..Default::default()
+        })?;
+        let pipeline = ctx.create_compute_pipeline(&ComputePipelineDesc {
+            module: Some(*module),
+            debug_name: "slow",
+            ..Default::default()
+        })?;
+        let mut work = Self { words, pipeline, rounds: 1 };
+        // The first dispatch compiles the shader.
+        work.run(ctx)?;
+        work.rounds = MEASURED_ROUNDS;
+        let start = Instant::now();
+        work.run(ctx)?;
+        let rounds = f64::from(MEASURED_ROUNDS) * time.as_secs_f64() / start.elapsed().as_secs_f64();
+        Ok(Self { rounds: rounds as u32, ..work })
+    }
+
+    /// Records the dispatch.
+    pub(crate) fn record(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        cmd.bind_compute_pipeline(*self.pipeline)?;
+        cmd.push_constants(&Push { words: self.words.address()?, rounds: self.rounds, tail: 0 })?;
+        cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*self.words], ..Default::default() })
+    }
+
+    fn run(&self, ctx: &Context) -> lvk::Result<()> {
+        let mut cmd = ctx.acquire_command_buffer()?;
+        self.record(&mut cmd)?;
+        ctx.wait(ctx.submit(cmd)?)
+    }
+}
+
 /// Submits a dispatch of three seconds, and ends the context without a wait.
 pub(crate) fn outlives_its_context() -> Result<Vec<u8>, Failure> {
     let ctx = context(ContextDesc::default())?;
-    let words =
-        ctx.create_buffer(&BufferDesc { size_bytes: 64 * 4, debug_name: "words", ..Default::default() })?;
-    let module = ctx.create_shader_module(&ShaderModuleDesc {
-        stage: ShaderStage::Compute,
-        source: ShaderSource::Glsl(SLOW),
-        debug_name: "slow.comp",
-        ..Default::default()
-    })?;
-    let pipeline = ctx.create_compute_pipeline(&ComputePipelineDesc {
-        module: Some(*module),
-        debug_name: "slow",
-        ..Default::default()
-    })?;
-    // The first dispatch compiles the shader.
-    ctx.wait(submit(&ctx, *pipeline, *words, 1)?)?;
-    let start = Instant::now();
-    ctx.wait(submit(&ctx, *pipeline, *words, MEASURED_ROUNDS)?)?;
-    let rounds = f64::from(MEASURED_ROUNDS) * SECONDS / start.elapsed().as_secs_f64();
-    submit(&ctx, *pipeline, *words, rounds as u32)?;
-    Ok(b"submitted".to_vec())
-}
-
-fn submit(
-    ctx: &Context,
-    pipeline: ComputePipelineHandle,
-    buffer: BufferHandle,
-    rounds: u32,
-) -> Result<SubmitHandle, Failure> {
+    let work = SlowWork::new(&ctx, LONG)?;
     let mut cmd = ctx.acquire_command_buffer()?;
-    cmd.bind_compute_pipeline(pipeline)?;
-    cmd.push_constants(&Push { words: ctx.buffer_address(buffer)?, rounds, tail: 0 })?;
-    cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[buffer], ..Default::default() })?;
-    Ok(ctx.submit(cmd)?)
+    work.record(&mut cmd)?;
+    ctx.submit(cmd)?;
+    Ok(b"submitted".to_vec())
 }
