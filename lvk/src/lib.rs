@@ -291,7 +291,7 @@ pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
 #[cfg(unix)]
 pub use {
-    context::external_semaphore::{SemaphoreFdType, SemaphoreKind, SharedSemaphore},
+    context::external_semaphore::{SemaphoreFdType, SemaphoreKind, SharedSemaphore, SharedSemaphoreDesc},
     gpu::memory::external::{DrmLayout, DrmPlane, MemoryFd, MemoryFdType},
 };
 #[cfg(feature = "window")]

@@ -41,6 +41,23 @@ impl SemaphoreFdType {
     }
 }
 
+/// Description of a semaphore for [`Context::create_shared_semaphore`] and [`Context::import_semaphore`].
+#[derive(Debug, Clone, Copy)]
+pub struct SharedSemaphoreDesc<'a> {
+    /// Kind. Default: [`SemaphoreKind::Binary`].
+    pub kind: SemaphoreKind,
+    /// Type of the file descriptor. Default: [`SemaphoreFdType::Opaque`].
+    pub fd_type: SemaphoreFdType,
+    /// Name in error messages, validation messages and debuggers. Default: `"shared semaphore"`.
+    pub debug_name: &'a str,
+}
+
+impl Default for SharedSemaphoreDesc<'_> {
+    fn default() -> Self {
+        Self { kind: SemaphoreKind::Binary, fd_type: SemaphoreFdType::Opaque, debug_name: "shared semaphore" }
+    }
+}
+
 /// A semaphore that is shared by file descriptors, destroyed on drop. Drop it after [`Context::wait_idle`], when every
 /// submission that uses it is done.
 pub struct SharedSemaphore {
@@ -49,13 +66,15 @@ pub struct SharedSemaphore {
     fd_type: SemaphoreFdType,
     /// True if it was created here, for export.
     exportable: bool,
+    name: Box<str>,
     gpu: Arc<Gpu>,
 }
 
 impl std::fmt::Debug for SharedSemaphore {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { raw, kind, fd_type, .. } = self;
+        let Self { raw, kind, fd_type, name, .. } = self;
         out.debug_struct("SharedSemaphore")
+            .field("name", name)
             .field("raw", raw)
             .field("kind", kind)
             .field("fd_type", fd_type)
@@ -70,15 +89,11 @@ impl Context {
     /// # Errors
     /// [`Unsupported`](Error::Unsupported) where the device or its driver does not export such a semaphore;
     /// [`InvalidUsage`](Error::InvalidUsage) for the sync file of a timeline.
-    pub fn create_shared_semaphore(
-        &self,
-        kind: SemaphoreKind,
-        fd_type: SemaphoreFdType,
-    ) -> Result<SharedSemaphore> {
+    pub fn create_shared_semaphore(&self, desc: &SharedSemaphoreDesc<'_>) -> Result<SharedSemaphore> {
         let gpu = &self.device_state().gpu;
-        check_semaphore(gpu, kind, fd_type, vk::ExternalSemaphoreFeatureFlags::EXPORTABLE)?;
-        let export = vk::ExportSemaphoreCreateInfo::default().handle_types(fd_type.raw());
-        SharedSemaphore::new(gpu, kind, fd_type, Some(export))
+        check_semaphore(gpu, desc, vk::ExternalSemaphoreFeatureFlags::EXPORTABLE)?;
+        let export = vk::ExportSemaphoreCreateInfo::default().handle_types(desc.fd_type.raw());
+        SharedSemaphore::new(gpu, desc, Some(export))
     }
 
     /// Creates a semaphore from the file descriptor of another device, process or API (`vkImportSemaphoreFdKHR`). A
@@ -94,37 +109,36 @@ impl Context {
     /// closed then.
     pub unsafe fn import_semaphore(
         &self,
-        kind: SemaphoreKind,
-        fd_type: SemaphoreFdType,
+        desc: &SharedSemaphoreDesc<'_>,
         fd: Option<OwnedFd>,
     ) -> Result<SharedSemaphore> {
         // Vulkan's number for a sync file whose signal has come.
         const SIGNALLED: i32 = -1;
-        let gpu = &self.device_state().gpu;
-        if fd.is_none() && fd_type != SemaphoreFdType::SyncFile {
-            return Err(Error::usage(
-                "semaphore",
-                "only a sync file may be signalled and have no file descriptor",
-            ));
+        let (gpu, name) = (&self.device_state().gpu, desc.debug_name);
+        if fd.is_none() && desc.fd_type != SemaphoreFdType::SyncFile {
+            let message =
+                "only a sync file may be signalled and have no file descriptor; give it that of its export";
+            return Err(Error::usage(name, message));
         }
-        check_semaphore(gpu, kind, fd_type, vk::ExternalSemaphoreFeatureFlags::IMPORTABLE)?;
-        let semaphore = SharedSemaphore::new(gpu, kind, fd_type, None)?;
-        let flags = match fd_type {
+        check_semaphore(gpu, desc, vk::ExternalSemaphoreFeatureFlags::IMPORTABLE)?;
+        let semaphore = SharedSemaphore::new(gpu, desc, None)?;
+        let flags = match desc.fd_type {
             SemaphoreFdType::Opaque => vk::SemaphoreImportFlags::empty(),
             SemaphoreFdType::SyncFile => vk::SemaphoreImportFlags::TEMPORARY,
         };
         let info = vk::ImportSemaphoreFdInfoKHR::default()
             .semaphore(semaphore.raw)
             .flags(flags)
-            .handle_type(fd_type.raw())
+            .handle_type(desc.fd_type.raw())
             .fd(fd.as_ref().map_or(SIGNALLED, AsRawFd::as_raw_fd));
         // SAFETY: the semaphore is new; the caller promises the rest.
         unsafe { functions(gpu).import_semaphore_fd(&info) }.map_err(|result| match result {
             vk::Result::ERROR_INVALID_EXTERNAL_HANDLE => Error::usage(
-                "semaphore",
-                "the file descriptor is no semaphore of its type that this device can import",
+                name,
+                "the file descriptor is no semaphore of its type that this device can import; export it by the same \
+                 driver as this type",
             ),
-            other => Error::vulkan("vkImportSemaphoreFdKHR", "semaphore")(other),
+            other => Error::vulkan("vkImportSemaphoreFdKHR", name)(other),
         })?;
         // The driver owns the file descriptor now.
         let _ = fd.map(IntoRawFd::into_raw_fd);
@@ -135,10 +149,10 @@ impl Context {
 impl SharedSemaphore {
     fn new(
         gpu: &Arc<Gpu>,
-        kind: SemaphoreKind,
-        fd_type: SemaphoreFdType,
+        desc: &SharedSemaphoreDesc<'_>,
         export: Option<vk::ExportSemaphoreCreateInfo<'_>>,
     ) -> Result<Self> {
+        let SharedSemaphoreDesc { kind, fd_type, debug_name } = *desc;
         let exportable = export.is_some();
         let mut export = export;
         let mut ty = vk::SemaphoreTypeCreateInfo::default().semaphore_type(raw_kind(kind));
@@ -148,8 +162,9 @@ impl SharedSemaphore {
         }
         // SAFETY: the description is valid, and the handle type is checked.
         let raw = unsafe { gpu.device.create_semaphore(&info, None) }
-            .map_err(Error::vulkan("vkCreateSemaphore", "semaphore"))?;
-        Ok(Self { raw, kind, fd_type, exportable, gpu: Arc::clone(gpu) })
+            .map_err(Error::vulkan("vkCreateSemaphore", debug_name))?;
+        gpu.name(raw, debug_name);
+        Ok(Self { raw, kind, fd_type, exportable, name: debug_name.into(), gpu: Arc::clone(gpu) })
     }
 
     /// Returns the semaphore for [`RawWait`](crate::RawWait) and [`RawSignal`](crate::RawSignal) of
@@ -175,18 +190,18 @@ impl SharedSemaphore {
     pub unsafe fn export(&self) -> Result<Option<OwnedFd>> {
         if !self.exportable {
             return Err(Error::usage(
-                "semaphore",
+                &*self.name,
                 "it was imported; export the one that its exporter created",
             ));
         }
         let info = vk::SemaphoreGetFdInfoKHR::default().semaphore(self.raw).handle_type(self.fd_type.raw());
         // SAFETY: the semaphore was created for export as this type; the caller promises the rest.
         let fd = unsafe { functions(&self.gpu).get_semaphore_fd(&info) }
-            .map_err(Error::vulkan("vkGetSemaphoreFdKHR", "semaphore"))?;
+            .map_err(Error::vulkan("vkGetSemaphoreFdKHR", &self.name))?;
         // SAFETY: Vulkan gives the caller a new file descriptor, or -1.
         match unsafe { owned_fd(fd) } {
             None if self.fd_type != SemaphoreFdType::SyncFile => {
-                Err(Error::vulkan("vkGetSemaphoreFdKHR", "semaphore")(vk::Result::ERROR_UNKNOWN))
+                Err(Error::vulkan("vkGetSemaphoreFdKHR", &self.name)(vk::Result::ERROR_UNKNOWN))
             }
             fd => Ok(fd),
         }
@@ -214,17 +229,15 @@ fn raw_kind(kind: SemaphoreKind) -> vk::SemaphoreType {
 /// Fails unless the driver shares such semaphores in this direction.
 fn check_semaphore(
     gpu: &Gpu,
-    kind: SemaphoreKind,
-    fd_type: SemaphoreFdType,
+    desc: &SharedSemaphoreDesc<'_>,
     direction: vk::ExternalSemaphoreFeatureFlags,
 ) -> Result<()> {
+    let SharedSemaphoreDesc { kind, fd_type, debug_name } = *desc;
     if kind == SemaphoreKind::Timeline && fd_type == SemaphoreFdType::SyncFile {
-        return Err(Error::usage(
-            "semaphore",
-            "a sync file holds a binary semaphore; share a timeline as Opaque",
-        ));
+        let message = "a sync file holds a binary semaphore; share a timeline as Opaque";
+        return Err(Error::usage(debug_name, message));
     }
-    let what = format!("a shared {kind:?} semaphore");
+    let what = format!("the shared {kind:?} semaphore '{debug_name}'");
     gpu.require(OptionalFeature::ExternalSemaphoreFd, &what)?;
     let mut ty = vk::SemaphoreTypeCreateInfo::default().semaphore_type(raw_kind(kind));
     let info =

@@ -8,7 +8,7 @@ use lvk::ash::vk;
 use lvk::{
     BufferDesc, BufferUsage, ClearValue, Context, Dependencies, DeviceProfile, Error, FeatureSet, Format,
     MemoryFd, MemoryFdType, MemoryKind, OptionalFeature, Queue, RawSignal, RawWait, SemaphoreFdType,
-    SemaphoreKind, TextureDesc, TextureKind, TextureRange, TextureRegion, TextureUsage,
+    SemaphoreKind, SharedSemaphoreDesc, TextureDesc, TextureKind, TextureRange, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::{TestDevice, device, device_with};
@@ -163,7 +163,8 @@ fn exportable_textures_take_data() {
 fn two_contexts_share_a_semaphore() {
     let Some((exporter, importer)) = two_contexts(OptionalFeature::ExternalSemaphoreFd) else { return };
     for kind in [SemaphoreKind::Timeline, SemaphoreKind::Binary] {
-        let shared = exporter.create_shared_semaphore(kind, SemaphoreFdType::Opaque);
+        let desc = SharedSemaphoreDesc { kind, debug_name: "handover", ..Default::default() };
+        let shared = exporter.create_shared_semaphore(&desc);
         if let Err(Error::Unsupported { .. }) = shared {
             eprintln!("SKIPPED, the driver does not share {kind:?} semaphores");
             continue;
@@ -171,13 +172,11 @@ fn two_contexts_share_a_semaphore() {
         let shared = shared.unwrap();
         assert_eq!(shared.kind(), kind);
         // SAFETY: an opaque export needs no pending signal; the file descriptor is of this kind and type.
-        let imported = unsafe {
-            importer.import_semaphore(kind, SemaphoreFdType::Opaque, shared.export().unwrap()).unwrap()
-        };
+        let imported = unsafe { importer.import_semaphore(&desc, shared.export().unwrap()).unwrap() };
         // SAFETY: an imported semaphore is refused.
         let again = unsafe { imported.export() }.map(drop);
         assert!(
-            matches!(&again, Err(Error::InvalidUsage { message, .. }) if message.contains("imported")),
+            matches!(&again, Err(Error::InvalidUsage { object, message }) if object == "handover" && message.contains("imported")),
             "{again:?}"
         );
         let signal = RawSignal { semaphore: shared.raw(), value: 7 };
@@ -198,8 +197,7 @@ fn two_contexts_share_a_semaphore() {
 fn a_sync_file_that_is_signalled_has_no_file_descriptor() {
     let Some((_, importer)) = two_contexts(OptionalFeature::ExternalSemaphoreFd) else { return };
     // SAFETY: there is no file descriptor.
-    let imported =
-        unsafe { importer.import_semaphore(SemaphoreKind::Binary, SemaphoreFdType::SyncFile, None) };
+    let imported = unsafe { importer.import_semaphore(&sync_file(SemaphoreKind::Binary), None) };
     if let Err(Error::Unsupported { .. }) = imported {
         eprintln!("NOT TESTED, the driver imports no sync files");
         return;
@@ -262,11 +260,15 @@ fn a_device_without_the_extensions_refuses() {
     let texts = [
         message(ctx.create_exportable_buffer(&buffer_desc(), MemoryFdType::Opaque)),
         message(ctx.create_exportable_texture(&texture_desc(), MemoryFdType::DmaBuf)),
-        message(ctx.create_shared_semaphore(SemaphoreKind::Binary, SemaphoreFdType::Opaque)),
+        message(ctx.create_shared_semaphore(&SharedSemaphoreDesc::default())),
     ];
     for text in texts {
         assert!(text.contains("no sharing") && text.contains("VK_KHR_external_"), "{text}");
     }
+}
+
+fn sync_file(kind: SemaphoreKind) -> SharedSemaphoreDesc<'static> {
+    SharedSemaphoreDesc { kind, fd_type: SemaphoreFdType::SyncFile, debug_name: "frame done" }
 }
 
 /// A file descriptor of no memory.
@@ -311,12 +313,12 @@ fn wrong_descriptions_are_refused() {
         assert!(refused.contains("shared texture: imported memory has its contents"), "{refused}");
         let refused = message(ctx.import_texture_memory(&texture_desc(), opaque(4)));
         assert!(refused.contains("shared texture: the imported memory has 4 bytes"), "{refused}");
-        let sync_file =
-            ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile, Some(other_file()));
-        assert!(message(sync_file).contains("a sync file holds a binary semaphore"));
-        let none = ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::Opaque, None);
-        assert!(message(none).contains("only a sync file may be signalled"));
-        let timeline = ctx.create_shared_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile);
-        assert!(message(timeline).contains("a sync file holds a binary semaphore"));
+        let timeline = sync_file(SemaphoreKind::Timeline);
+        let imported = message(ctx.import_semaphore(&timeline, Some(other_file())));
+        assert!(imported.contains("frame done: a sync file holds a binary semaphore"), "{imported}");
+        let none = message(ctx.import_semaphore(&SharedSemaphoreDesc::default(), None));
+        assert!(none.contains("shared semaphore: only a sync file may be signalled"), "{none}");
+        let created = message(ctx.create_shared_semaphore(&timeline));
+        assert!(created.contains("frame done: a sync file holds a binary semaphore"), "{created}");
     }
 }

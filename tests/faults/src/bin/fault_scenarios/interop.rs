@@ -3,7 +3,7 @@
 use lvk::ash::vk;
 use lvk::{
     BufferDesc, ClearValue, CommandBuffer, Context, ContextDesc, Format, MemoryFdType, OptionalFeature,
-    RawSignal, RawWait, SemaphoreFdType, SemaphoreKind, TextureDesc, TextureRange, TextureRegion,
+    RawSignal, RawWait, SemaphoreKind, SharedSemaphoreDesc, TextureDesc, TextureRange, TextureRegion,
     TextureUsage,
 };
 
@@ -84,10 +84,11 @@ fn submit_with_semaphore(
     [exporter, importer]: [&Context; 2],
     [ours, theirs]: [CommandBuffer; 2],
 ) -> lvk::Result<()> {
-    let (kind, fd_type) = (SemaphoreKind::Timeline, SemaphoreFdType::Opaque);
-    let shared = exporter.create_shared_semaphore(kind, fd_type)?;
+    let desc =
+        SharedSemaphoreDesc { kind: SemaphoreKind::Timeline, debug_name: "handover", ..Default::default() };
+    let shared = exporter.create_shared_semaphore(&desc)?;
     // SAFETY: an opaque export of a timeline needs no signal; the file descriptor is of this kind and type.
-    let imported = unsafe { importer.import_semaphore(kind, fd_type, shared.export()?)? };
+    let imported = unsafe { importer.import_semaphore(&desc, shared.export()?)? };
     let stages = vk::PipelineStageFlags2::ALL_COMMANDS;
     // SAFETY: the signal is submitted before the wait. Both semaphores outlive the work, since both contexts wait for it.
     let submitted = unsafe {

@@ -89,14 +89,27 @@ fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
 
 /// Opens a context with the driver of tests and, where the environment asks for it, the validation layer.
 fn context_without_caches(desc: ContextDesc<'_>) -> Result<Context, Failure> {
-    let validates = std::env::var_os("LVK_FAULT_VALIDATE").is_some();
-    let driver = prepare(&DriverRequest { validation: validates, ..DriverRequest::default() })?;
+    let validation = validation();
+    let driver = prepare(&driver_request(validation))?;
     Ok(Context::new(&ContextDesc {
         application_name: "faults",
         vulkan_library: driver.loader.as_deref(),
-        validation: if validates { ValidationMode::Standard } else { ValidationMode::Off },
+        validation,
         ..desc
     })?)
+}
+
+/// Returns the validation that the environment asks for.
+fn validation() -> ValidationMode {
+    match std::env::var_os("LVK_FAULT_VALIDATE") {
+        Some(_) => ValidationMode::Standard,
+        None => ValidationMode::Off,
+    }
+}
+
+/// Returns the request for the driver of tests, with the validation layer where it is needed.
+fn driver_request(validation: ValidationMode) -> DriverRequest {
+    DriverRequest { validation: validation != ValidationMode::Off, ..DriverRequest::default() }
 }
 
 /// Runs a scenario of this program, or the sample of this name.

@@ -3,12 +3,12 @@
 use std::ffi::CStr;
 
 use lvk::ash::{self, vk};
-use lvk::{Context, ContextDesc, RawSignal};
-use lvk_dev_driver::{DriverRequest, prepare};
+use lvk::{Context, ContextDesc, RawSignal, ValidationMode};
+use lvk_dev_driver::prepare;
 use lvk_faults::layer::NAMES_VARIABLE;
 
-use crate::Failure;
 use crate::compute::{read_words, record_step, step_pipeline, words_buffer};
+use crate::{Failure, driver_request, validation};
 
 /// Turns an error of the engine's own calls into one that names the command and its object.
 fn in_call(command: &'static str, object: &'static str) -> impl Fn(vk::Result) -> Failure {
@@ -72,15 +72,16 @@ impl Drop for EngineSemaphore<'_> {
 
 /// Runs a step on the engine's device; the engine waits for it. Returns the words.
 pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
-    // A run that is to tell the names of objects needs an instance with names.
-    let reads_names = std::env::var_os(NAMES_VARIABLE).is_some();
-    let extensions: &[&CStr] = if reads_names { &[ash::ext::debug_utils::NAME] } else { &[] };
-    let engine = instance(extensions)?;
+    // A run that is to tell the names of objects, or messages of the validation layer, needs an instance with the extension for both.
+    let (reads_names, validation) = (std::env::var_os(NAMES_VARIABLE).is_some(), validation());
+    let tells = reads_names || validation != ValidationMode::Off;
+    let extensions: &[&CStr] = if tells { &[ash::ext::debug_utils::NAME] } else { &[] };
+    let engine = instance(extensions, validation)?;
     // SAFETY: the instance is alive.
     let devices = unsafe { engine.raw.enumerate_physical_devices() }
         .map_err(in_call("vkEnumeratePhysicalDevices", "instance"))?;
     let physical = *devices.first().ok_or("no device")?;
-    let desc = ContextDesc { debug_names: reads_names.then_some(true), ..Default::default() };
+    let desc = ContextDesc { debug_names: reads_names.then_some(true), validation, ..Default::default() };
     // SAFETY: the handles belong together, and are destroyed after the context and all that it made.
     unsafe {
         let needs = Context::requirements(&engine.entry, &engine.raw, extensions, physical, &desc)?;
@@ -101,12 +102,16 @@ pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
     }
 }
 
-fn instance(extensions: &[&CStr]) -> Result<EngineInstance, Failure> {
-    let driver = prepare(&DriverRequest::default())?;
+fn instance(extensions: &[&CStr], validation: ValidationMode) -> Result<EngineInstance, Failure> {
+    let driver = prepare(&driver_request(validation))?;
+    let layers: &[_] =
+        if validation == ValidationMode::Off { &[] } else { &[c"VK_LAYER_KHRONOS_validation".as_ptr()] };
     let version = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
     let extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
-    let info =
-        vk::InstanceCreateInfo::default().application_info(&version).enabled_extension_names(&extensions);
+    let info = vk::InstanceCreateInfo::default()
+        .application_info(&version)
+        .enabled_extension_names(&extensions)
+        .enabled_layer_names(layers);
     // SAFETY: the library is a Vulkan loader, and the description is valid.
     unsafe {
         let entry = match &driver.loader {
