@@ -498,7 +498,6 @@ fn a_surface_that_a_command_buffer_keeps_is_told() {
         assert!(told.contains("main window") && told.contains("not submitted"), "{told}");
     }
     drop(recorded);
-    ctx.wait_idle().unwrap();
     ctx.suspend_swapchain(*swapchain).unwrap();
     ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48]).unwrap();
     present_until_visible(&ctx, *swapchain, &window, GREEN);

@@ -17,6 +17,8 @@ pub(crate) struct Compactions {
     pub(crate) copies: Vec<PlannedCopy>,
     /// Acceleration structures that copies replaced. Their memory is freed later.
     pub(crate) replaced: Vec<Weak<BlasStructures>>,
+    /// True if a TLAS could not be written again at the last submission.
+    pub(crate) rewrite_failed: bool,
 }
 
 /// A copy with known sizes.

@@ -258,6 +258,10 @@ fn convert_triangles(
     check_alignment(name, "vertex stride", stride, unit)?;
     check_limit_of(LimitOrigin::Vulkan, name, "vertex stride in bytes", stride, u32::MAX.into())?;
     check_elements(&vertices, triangles.vertex_offset, triangles.vertex_count, stride, packed)?;
+    if triangles.indices.is_some() && triangles.triangle_count > 0 && triangles.vertex_count == 0 {
+        let message = format!("{} triangles with indices need at least one vertex", triangles.triangle_count);
+        return Err(Error::usage(name, message));
+    }
     let matrix = match triangles.transform {
         Some(GeometryTransform::Buffer { buffer, offset }) => transform_address(name, buffer, offset, find)?,
         _ => matrix,
@@ -270,11 +274,6 @@ fn convert_triangles(
         .index_type(vk::IndexType::NONE_KHR)
         .transform_data(host_or_device_address(matrix));
     match triangles.indices {
-        Some(_) if triangles.triangle_count > 0 && triangles.vertex_count == 0 => {
-            let message =
-                format!("{} triangles with indices need at least one vertex", triangles.triangle_count);
-            return Err(Error::usage(name, message));
-        }
         Some(indices) => {
             data = data
                 .index_type(indices.format.raw())

@@ -187,9 +187,9 @@ impl CommandBuffer {
         }
     }
 
-    /// Poisons the command buffer, which cannot be submitted any more: a command failed with a part of it recorded. That which runs
-    /// before the next submission runs all the same, as it has the work of other calls: its failed command has written
-    /// only memory of objects whose creation fails with it, or which a later submission writes again.
+    /// Poisons the command buffer, which cannot be submitted any more: a command failed with a part of it recorded. The
+    /// prologue of the next submission is submitted all the same, as it has the work of other calls: its failed command
+    /// writes only memory of objects whose creation fails too, or which a later submission writes again.
     #[cold]
     pub(super) fn poison(&mut self, name: &str, error: Error) -> Error {
         self.state.poisoned.get_or_insert_with(|| name.to_owned());

@@ -94,12 +94,17 @@ impl Context {
         if let Err(error) = advanced {
             log::warn!("compaction failed to advance: {error}");
         }
-        if self.device_state().take_tlas_outdated()
-            && let Err(error) = self.rewrite_outdated_tlas()
-        {
-            self.device_state().mark_tlas_outdated();
-            let remedy = "the next submission tries again";
-            log::warn!("a TLAS still references BLAS from before their compaction, and {remedy}: {error}");
+        if self.device_state().take_tlas_outdated() {
+            let rewritten = self.rewrite_outdated_tlas();
+            let failed_before =
+                std::mem::replace(&mut self.lock_compactions().rewrite_failed, rewritten.is_err());
+            if let Err(error) = rewritten {
+                self.device_state().mark_tlas_outdated();
+                if !failed_before {
+                    let remedy = "each later submission tries again";
+                    log::warn!("a TLAS references BLAS from before their compaction, and {remedy}: {error}");
+                }
+            }
         }
     }
 
@@ -180,8 +185,8 @@ impl Context {
     }
 
     /// Writes and builds again each TLAS that references replaced BLAS. Collects them a second time once the command
-    /// buffer is open: objects that another thread destroys earlier do not wait for that command buffer. Returns the first error
-    /// once all were tried.
+    /// buffer is open: objects that another thread destroys earlier do not wait for that command buffer. Returns the
+    /// first error once all were tried.
     fn rewrite_outdated_tlas(&self) -> Result<()> {
         if self.outdated_tlas().is_empty() {
             return Ok(());

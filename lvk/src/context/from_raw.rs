@@ -16,8 +16,9 @@ impl Context {
     /// [`requirements`](Self::requirements) says what the device needs, and
     /// [`DeviceRequirements::raw_context`](crate::DeviceRequirements::raw_context) fills in `raw`. Members of `desc`
     /// that configure device creation are ignored: the library, the device, the profile, and user extensions. Required
-    /// features only count in the choice between the device's ray tracing pipelines and lowered ones. Its ray tracing requests apply as far as `raw` allows them. A window needs the extensions for its
-    /// window system and for swapchains in `raw`.
+    /// features only count in the choice between the device's ray tracing pipelines and lowered ones. Ray tracing
+    /// requests apply as far as `raw` allows them. A window needs the extensions for its window system and for
+    /// swapchains in `raw`.
     ///
     /// The caller turns the validation layer on. With [`ContextDesc::validation`], the context receives the layer's
     /// messages about everything on the instance, which needs `VK_EXT_debug_utils` in `raw`. Vulkan does not tell whether

@@ -97,8 +97,9 @@ impl Context {
             )
     }
 
-    /// Submits a copy into a new buffer. `record` looks up its source by handle, or defers its destruction, as the wait for the copy
-    /// may fail. An object that another thread destroys before the command buffer is open does not wait for the copy.
+    /// Submits a copy into a new buffer. `record` looks up the source by handle, or defers the destruction of the source,
+    /// as the wait for the copy may fail. An object that another thread destroys before the command buffer is open does
+    /// not wait for the copy.
     pub(super) fn read_later(
         &self,
         size: u64,

@@ -172,10 +172,10 @@ impl Context {
     /// nothing if the surface is gone already.
     ///
     /// # Errors
-    /// The swapchain is suspended all the same, and its surface stays; another call tries again.
     /// [`InvalidUsage`](Error::InvalidUsage) if views of its images, or command buffers that were not submitted, keep
-    /// the surface: it is destroyed when they are dropped. [`StaleHandle`](Error::StaleHandle),
-    /// [`DeviceLost`](Error::DeviceLost).
+    /// the surface: the surface is destroyed when they are dropped. After a shortage of memory the surface may stay; another
+    /// call tries again. The swapchain is suspended in these cases too. [`DeviceLost`](Error::DeviceLost),
+    /// [`StaleHandle`](Error::StaleHandle).
     pub fn suspend_swapchain(&self, swapchain: SwapchainHandle) -> Result<()> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
@@ -183,7 +183,7 @@ impl Context {
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let suspended = lifecycle.suspend(&object.name, &mut live);
         self.device_state().submitter.explain_loss(suspended)?;
-        if resources.released.strong_count() > 0 {
+        if resources.is_released_surface_kept() {
             let message = "views of its images, or command buffers that were not submitted, keep its surface; drop \
                            them before its window goes";
             return Err(Error::usage(&*object.name, message));
@@ -308,19 +308,21 @@ impl PresentBackend for LiveBackend<'_> {
 
     /// Waits for the GPU: this is rare, and swapchains must be destroyed before the window can have another surface.
     fn release_surface(&mut self) -> Result<(), Failure> {
-        if self.resources.surface.is_none() && self.resources.has_no_chains() {
+        if !self.resources.has_surface() {
             return Ok(());
         }
-        self.resources.wait_for_presents()?;
-        let retired = self.retire_current();
-        let idle = self.ctx.wait_idle();
-        retired?;
-        idle?;
-        self.resources.clear_retired();
-        if let Some(surface) = self.resources.surface.take() {
-            self.resources.released = Arc::downgrade(&surface);
+        let is_loss = |result: &Result<()>| matches!(result, Err(Error::DeviceLost { .. }));
+        let mut released = self.resources.wait_for_presents();
+        if released.is_ok() || is_loss(&released) {
+            released = released.and(self.retire_current());
+            let idle = self.ctx.wait_idle();
+            released = released.and(idle);
         }
-        Ok(())
+        // A lost device uses no objects.
+        if released.is_ok() || is_loss(&released) {
+            self.resources.release();
+        }
+        Ok(released?)
     }
 
     fn create_surface(&mut self) -> Result<(), Failure> {
@@ -338,6 +340,11 @@ impl PresentBackend for LiveBackend<'_> {
             of_window => of_window,
         });
         let retired = self.retire_current();
+        if made.is_err()
+            && let Err(error) = &retired
+        {
+            log::error!("{}: an acquired image cannot be released: {error}", readable_name(&**self.name));
+        }
         let chain = Arc::new(made?);
         retired?;
         if let Some(hdr) = &self.resources.config.hdr {
@@ -428,8 +435,8 @@ impl LiveBackend<'_> {
             match self.new_image(chain, plan, raw) {
                 Ok(image) => images.push(image),
                 Err(error) => {
-                    // None of them is acquired, so no wait can fail.
-                    drop(self.retire_images(images));
+                    // No image is acquired, so there is no wait that can fail.
+                    let (_, _released) = self.retire_images(images);
                     return Err(error.into());
                 }
             }
@@ -477,7 +484,8 @@ impl LiveBackend<'_> {
         released
     }
 
-    /// Destroys the textures of images. Submits waits for images that were acquired and not used, and returns the result of that.
+    /// Destroys the textures of images. Submits waits for images that were acquired and not used, and returns the result
+    /// of that submission.
     fn retire_images(&mut self, images: Vec<ChainImage>) -> (Vec<PresentSync>, Result<()>) {
         let shared = self.ctx.device_state();
         let mut waits = Vec::new();

@@ -196,7 +196,8 @@ impl PresentSync {
         !self.presented || self.present_fence.is_some()
     }
 
-    /// Returns true if nothing uses the objects when the timeline has reached `completed`; `None` if the device cannot tell.
+    /// Returns true if nothing uses the objects when the timeline has reached `completed`; `None` if the device cannot
+    /// tell.
     pub(crate) fn is_done(&self, completed: u64) -> Result<Option<bool>> {
         if !self.presented {
             // A present that failed leaves the semaphore to the submission before it.

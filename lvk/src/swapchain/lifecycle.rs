@@ -162,7 +162,7 @@ impl SwapchainState {
         Ok(RecreateStep::Again)
     }
 
-    /// Destroys the surface, if it is there. There are no images until [`resume`](Self::resume), on failure neither.
+    /// Destroys the surface, if it is there. There are no images until [`resume`](Self::resume), also after a failure.
     pub(crate) fn suspend(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
         (self.acquired, self.extent) = (None, None);
         self.status = SwapchainStatus::Suspended;

@@ -29,8 +29,8 @@ pub(super) fn wait_for_all<T>(
     all.map(|()| given_up)
 }
 
-/// Asks for about a second until all presents are finished, where a wait for them has failed for lack of memory. `ask` returns the
-/// number of unfinished presents, and may lack memory too. Returns the last answer.
+/// Asks for about a second until all presents are finished, after a wait for them failed for lack of memory. `ask`
+/// returns the number of unfinished presents, and may lack memory too. Returns the last answer.
 pub(super) fn ask_until_finished(
     mut ask: impl FnMut() -> Result<usize>,
     mut pause: impl FnMut(Duration),

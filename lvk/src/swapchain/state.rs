@@ -49,8 +49,8 @@ pub(crate) struct SwapchainResources {
     pub(crate) window: Arc<dyn WindowHandles>,
     /// `None` while the swapchain is suspended, and after a surface was lost and no other could be created.
     pub(crate) surface: Option<Arc<Surface>>,
-    /// The surface before. It lives as long as command buffers or views keep its images.
-    pub(crate) released: Weak<Surface>,
+    /// Surfaces that were released. Each lives as long as command buffers or views keep its images.
+    pub(crate) released: Vec<Weak<Surface>>,
     /// `None` without images, for example for a minimised window.
     pub(crate) current: Option<Current>,
     /// Acquire semaphores, each with the timeline value from which on it is free.
@@ -95,7 +95,7 @@ impl Swapchain {
             config,
             window: Arc::clone(&surface.window),
             surface: Some(Arc::new(surface)),
-            released: Weak::new(),
+            released: Vec::new(),
             current: None,
             semaphores: Vec::new(),
             signalled: None,
@@ -175,7 +175,8 @@ impl SwapchainResources {
         self.wait_for_queue()
     }
 
-    /// Waits as [`wait_for_presents`](Self::wait_for_presents) does. Where memory for that lacks, asks for about a second.
+    /// Waits as [`wait_for_presents`](Self::wait_for_presents) does. If memory for the wait is short, asks the fences for
+    /// about a second.
     fn wait_persistently(&self) -> Result<()> {
         match self.wait_for_presents() {
             Err(Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. }) => {}
@@ -184,18 +185,22 @@ impl SwapchainResources {
         let unfinished = ask_until_finished(|| self.count_unfinished(), std::thread::sleep)?;
         if unfinished > 0 {
             self.warn_of_abandoned(unfinished);
+            self.wait_for_queue()?;
         }
         Ok(())
     }
 
     /// Returns the number of presents that are not finished.
     fn count_unfinished(&self) -> Result<usize> {
-        let mut unfinished = 0;
+        let (mut unfinished, mut told) = (0, true);
         for sync in self.syncs() {
             match sync.is_done(u64::MAX)? {
                 Some(done) => unfinished += usize::from(!done),
-                None => self.wait_for_queue()?,
+                None => told = false,
             }
+        }
+        if !told {
+            self.wait_for_queue()?;
         }
         Ok(unfinished)
     }
@@ -221,14 +226,22 @@ impl SwapchainResources {
         );
     }
 
-    /// True if there is no Vulkan swapchain, neither one in use nor a replaced one.
-    pub(crate) fn has_no_chains(&self) -> bool {
-        self.current.is_none() && self.retired.is_empty()
+    /// True if there is a surface, also one that was released and that something keeps.
+    pub(crate) fn has_surface(&mut self) -> bool {
+        self.surface.is_some() || self.is_released_surface_kept()
     }
 
-    /// Destroys all replaced swapchains. Their presents are finished or abandoned.
-    pub(crate) fn clear_retired(&mut self) {
+    /// True if command buffers or views keep a surface that was released.
+    pub(crate) fn is_released_surface_kept(&mut self) -> bool {
+        self.released.retain(|surface| surface.strong_count() > 0);
+        !self.released.is_empty()
+    }
+
+    /// Destroys all replaced swapchains, and the surface if nothing else keeps it. Their presents are finished or
+    /// abandoned.
+    pub(crate) fn release(&mut self) {
         self.retired.clear();
+        self.released.extend(self.surface.take().as_ref().map(Arc::downgrade));
     }
 }
 
