@@ -432,11 +432,7 @@ fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl Fn
         match is_done() {
             Ok(true) => return true,
             Ok(false) => {}
-            Err(Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. })
-                if failures < MOST_FAILURES =>
-            {
-                failures += 1;
-            }
+            Err(error) if error.lacks_memory() && failures < MOST_FAILURES => failures += 1,
             // A lost device uses no objects.
             Err(error) => return matches!(error, Error::DeviceLost { .. }),
         }

@@ -339,6 +339,11 @@ impl Error {
         }
     }
 
+    /// True if the host or the device has no memory left for a call.
+    pub(crate) fn lacks_memory(&self) -> bool {
+        matches!(self, Self::OutOfHostMemory { .. } | Self::OutOfDeviceMemory { .. })
+    }
+
     /// Returns the error for the loss of the device in `call` about `object`, of which no more is known yet.
     pub(crate) fn device_lost(call: &'static str, object: impl Into<String>) -> Self {
         let report = DeviceLossReport { call, object: object.into(), ..DeviceLossReport::default() };

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// Maximum time to wait for presents, in nanoseconds. A hidden window may never have a free image, and a terminated
 /// engine never finishes a present. The application must not hang because of them.
@@ -40,8 +40,8 @@ pub(super) fn ask_until_finished(
     for _ in 1..TRIES {
         match ask() {
             Ok(0) => return Ok(0),
-            Ok(_) | Err(Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. }) => pause(PAUSE),
-            Err(error) => return Err(error),
+            Err(error) if !error.lacks_memory() => return Err(error),
+            Ok(_) | Err(_) => pause(PAUSE),
         }
     }
     ask()
@@ -52,6 +52,7 @@ mod tests {
     use ash::vk;
 
     use super::*;
+    use crate::error::Error;
 
     #[test]
     fn a_present_that_never_ends_times_out_and_the_others_are_polled() {

@@ -179,7 +179,7 @@ impl SwapchainResources {
     /// about a second.
     fn wait_persistently(&self) -> Result<()> {
         match self.wait_for_presents() {
-            Err(Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. }) => {}
+            Err(error) if error.lacks_memory() => {}
             ended => return ended,
         }
         let unfinished = ask_until_finished(|| self.count_unfinished(), std::thread::sleep)?;
