@@ -15,6 +15,14 @@ pub const REQUESTS: [QueueRequest; 3] =
 /// Words of the buffers of steps.
 pub const WORDS: usize = 64;
 
+/// Returns the queues of `soak`: emulated ones, which any device has, or the device's own where `LVK_TEST_QUEUES` is `own`.
+pub fn long_run_queues() -> QueueRequest {
+    match std::env::var("LVK_TEST_QUEUES").as_deref() {
+        Ok("own") => QueueRequest::OwnHardware,
+        _ => QueueRequest::Emulated,
+    }
+}
+
 /// Runs a test with each request, and prints which hardware the queues have.
 pub fn for_each_queue_request(test: impl Fn(&TestDevice)) {
     for queues in REQUESTS {

@@ -2,8 +2,8 @@
 //! presentation engine is a [`PresentBackend`], so that tests can use a scripted one.
 
 use super::choose::Failure;
-use crate::error::Result;
 use crate::error::readable::readable_name;
+use crate::error::{Error, Result};
 
 /// The presentation engine of a swapchain. There is one implementor besides the scripted engine of the tests. A real
 /// engine cannot reproduce each order of failures and recreations.
@@ -123,7 +123,9 @@ impl SwapchainState {
                     lost = true;
                     self.status = SwapchainStatus::SurfaceLost;
                 }
-                Err(Failure::Other(error)) if self.status == SwapchainStatus::SurfaceReleased => {
+                Err(Failure::Other(error))
+                    if self.status == SwapchainStatus::SurfaceReleased && is_refusal(&error) =>
+                {
                     log::warn!("{}: its window supports no other surface: {error}", readable_name(name));
                     return Err(Failure::SurfaceLost.into_error(name));
                 }
@@ -242,6 +244,11 @@ impl SwapchainState {
     }
 }
 
+/// True if a window refuses a surface; false if memory lacks or the device is lost, which the caller must hear as such.
+fn is_refusal(error: &Error) -> bool {
+    !error.lacks_memory() && !matches!(error, Error::DeviceLost { .. })
+}
+
 enum RecreateStep<T> {
     Again,
     Nothing,
@@ -256,7 +263,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::error::Error;
 
     /// Event at one call of a scripted engine.
     #[derive(Debug, Clone, Copy)]
@@ -511,10 +517,13 @@ mod tests {
     }
 
     /// A window that takes no surface, or a surface and no swapchain. Tells whether the surface is there.
+    #[derive(Default)]
     struct Refusing {
         takes_surface: bool,
         has_surface: bool,
         release_fails: bool,
+        /// What Vulkan answers where a surface is created.
+        creation_fails: Option<vk::Result>,
     }
 
     impl PresentBackend for Refusing {
@@ -533,6 +542,9 @@ mod tests {
         }
         fn create_surface(&mut self) -> Result<(), Failure> {
             assert!(!self.has_surface, "a window takes no second surface");
+            if let Some(result) = self.creation_fails {
+                return Err(Error::vulkan("vkCreateXcbSurfaceKHR", "window")(result).into());
+            }
             self.has_surface = self.takes_surface;
             let refused = || Error::unsupported("presentation to this window", "a test").into();
             self.takes_surface.then_some(()).ok_or_else(refused)
@@ -549,7 +561,7 @@ mod tests {
     #[test]
     fn a_window_that_takes_no_surface_or_no_swapchain_leaves_the_swapchain_suspended() {
         for takes_surface in [false, true] {
-            let mut backend = Refusing { takes_surface, has_surface: false, release_fails: false };
+            let mut backend = Refusing { takes_surface, ..Default::default() };
             let mut state = SwapchainState::new();
             let error = state.resume("window", &mut backend).unwrap_err();
             assert!(matches!(error, Error::Unsupported { .. }), "{error:?}");
@@ -557,17 +569,41 @@ mod tests {
             assert_eq!(state.acquire_image("window", &mut backend).unwrap(), None);
         }
         // The window of a lost surface has had one before, so its refusal is a loss.
-        let mut backend = Refusing { takes_surface: false, has_surface: false, release_fails: false };
+        let mut backend = Refusing::default();
         let mut state = SwapchainState::new();
         state.status = SwapchainStatus::SurfaceLost;
         let error = state.acquire_image("window", &mut backend).unwrap_err();
         assert!(matches!(error, Error::SurfaceLost { .. }), "{error:?}");
     }
 
+    /// A window of a lost surface is not gone where memory lacks for another one, or where the device is lost. The next call tries again.
+    #[test]
+    fn a_surface_that_no_memory_is_left_for_is_asked_for_again() {
+        let mut state = SwapchainState::new();
+        state.status = SwapchainStatus::SurfaceLost;
+        let mut backend = Refusing { takes_surface: true, ..Default::default() };
+        for result in [
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            vk::Result::ERROR_DEVICE_LOST,
+        ] {
+            backend.creation_fails = Some(result);
+            let error = state.acquire_image("window", &mut backend).unwrap_err();
+            assert!(!matches!(error, Error::SurfaceLost { .. }), "{error:?}");
+            assert!(error.to_string().contains("vkCreateXcbSurfaceKHR"), "{error}");
+        }
+        backend.creation_fails = Some(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR);
+        let error = state.acquire_image("window", &mut backend).unwrap_err();
+        assert!(matches!(error, Error::SurfaceLost { .. }), "{error:?}");
+        backend.creation_fails = None;
+        let error = state.acquire_image("window", &mut backend).unwrap_err();
+        assert!(backend.has_surface && matches!(error, Error::Unsupported { .. }), "{error:?}");
+    }
+
     /// A surface that stays, as the wait for its presents failed, is destroyed by the next call.
     #[test]
     fn a_surface_that_cannot_be_destroyed_is_told_each_time() {
-        let mut backend = Refusing { takes_surface: true, has_surface: false, release_fails: true };
+        let mut backend = Refusing { takes_surface: true, release_fails: true, ..Default::default() };
         let mut state = SwapchainState::new();
         let error = state.resume("window", &mut backend).unwrap_err();
         assert!(matches!(error, Error::Unsupported { .. }), "the first error is the cause: {error:?}");

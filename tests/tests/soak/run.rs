@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use lvk::{BufferDesc, Context, QueueRequest, Result, ValidationMode};
+use lvk::{BufferDesc, Context, Result, ValidationMode};
 use lvk_tests::device_with;
+use lvk_tests::queues::long_run_queues;
 #[cfg(target_os = "linux")]
 use lvk_tests::windows::desktop;
 
@@ -65,7 +66,7 @@ impl Soak {
         #[cfg(target_os = "linux")]
         let window = desktop().map(|desktop| desktop.window([64, 48]));
         let ctx = device_with(|desc| {
-            desc.queues = QueueRequest::Emulated;
+            desc.queues = long_run_queues();
             if !self.validation {
                 desc.validation = ValidationMode::Off;
             }

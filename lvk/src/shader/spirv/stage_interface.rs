@@ -68,16 +68,17 @@ impl LocationValue {
         is_float(self) == is_float(output) && self.bytes == output.bytes && self.count <= output.count
     }
 
+    /// Returns the first word behind the value.
+    pub(crate) fn end(&self) -> u64 {
+        u64::from(self.component) + u64::from(self.count) * u64::from(self.bytes.div_ceil(4))
+    }
+
     /// True if the values share words of a location.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        let end = |value: &Self| {
-            let words = u64::from(value.count) * u64::from(value.bytes.div_ceil(4));
-            u64::from(value.component) + words
-        };
         self.is_patch == other.is_patch
             && self.location == other.location
-            && u64::from(self.component) < end(other)
-            && u64::from(other.component) < end(self)
+            && u64::from(self.component) < other.end()
+            && u64::from(other.component) < self.end()
     }
 }
 

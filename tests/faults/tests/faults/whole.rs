@@ -128,6 +128,7 @@ whole_sweeps! {
     whole_blas_software: "blas_software";
     whole_threads: "threads";
     whole_queues: "queues";
+    whole_own_queues: "own_queues";
     whole_raw_device: "raw_device";
     whole_hot_reload: "hot_reload";
     whole_pipelines: "pipelines";

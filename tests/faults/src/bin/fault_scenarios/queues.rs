@@ -5,9 +5,19 @@ use lvk::{ContextDesc, Queue, QueueRequest};
 use crate::compute::{WORDS, read_words, record_step, step_pipeline, words_buffer};
 use crate::{Failure, context};
 
+/// Work on three queues that share one of Vulkan's, which any driver has.
+pub(crate) fn emulated() -> Result<Vec<u8>, Failure> {
+    three(QueueRequest::Emulated)
+}
+
+/// Work on the queues that the device has.
+pub(crate) fn own() -> Result<Vec<u8>, Failure> {
+    three(QueueRequest::OwnHardware)
+}
+
 /// Steps on the graphics and the compute queue, copies on the transfer queue. Returns the words of three buffers.
-pub(crate) fn three() -> Result<Vec<u8>, Failure> {
-    let ctx = context(ContextDesc { queues: QueueRequest::Emulated, ..Default::default() })?;
+fn three(queues: QueueRequest) -> Result<Vec<u8>, Failure> {
+    let ctx = context(ContextDesc { queues, ..Default::default() })?;
     let pipeline = step_pipeline(&ctx)?;
     let buffers = [words_buffer(&ctx, 1)?, words_buffer(&ctx, 2)?, words_buffer(&ctx, 3)?];
     for round in 0..3 {

@@ -42,8 +42,8 @@ pub(crate) fn frames_and_resize() -> Result<Vec<u8>, Failure> {
     Ok([first, second].concat())
 }
 
-/// Presents behind slow work, resizes while an image is acquired, and goes on in another window, as after a pause on Android. Returns
-/// the colours that both windows show.
+/// Presents behind slow work, resizes while an image is acquired, and goes on in another window, as after a pause on Android, which comes
+/// while a frame waits to be shown. Returns the colours that both windows show.
 pub(crate) fn another_window() -> Result<Vec<u8>, Failure> {
     let (window, ctx, swapchain) = start()?;
     let slow = SlowWork::new(&ctx, Duration::from_millis(60))?;
@@ -54,6 +54,8 @@ pub(crate) fn another_window() -> Result<Vec<u8>, Failure> {
     ctx.next_image(*swapchain)?;
     window.resize([80, 60])?;
     ctx.resize_swapchain(*swapchain, [80, 60])?;
+    // The suspension meets a present that waits for work of the GPU, and an image that is never presented.
+    present(&ctx, *swapchain, BLUE, Some(&slow))?;
     ctx.next_image(*swapchain)?;
     // An application that is paused lets its window go only if the surface is gone, and so asks again.
     ctx.suspend_swapchain(*swapchain).or_else(|error| {
