@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use lvk::test_hooks::{descriptor_slots, fail_submission_after, waiting_objects, with_fault_injection};
 use lvk::*;
 use lvk_tests::device::vulkan;
 use lvk_tests::random::Random;
@@ -501,6 +502,51 @@ fn a_surface_that_a_command_buffer_keeps_is_told() {
     ctx.suspend_swapchain(*swapchain).unwrap();
     ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48]).unwrap();
     present_until_visible(&ctx, *swapchain, &window, GREEN);
+}
+
+/// Images that could be created keep no `VkSwapchainKHR` where one of them could not: the window takes the next try.
+#[test]
+fn a_swapchain_that_lacks_slots_for_its_images_leaves_nothing() {
+    let Some((window, ctx)) = window_with(|desc| desc.max_textures = 8) else { return };
+    let texture = || ctx.create_texture(&TextureDesc { extent: [1, 1], ..Default::default() });
+    let mut textures: Vec<_> = std::iter::from_fn(|| texture().ok()).collect();
+    assert_eq!(textures.len(), 7);
+    // One image has a slot, and the next has none.
+    textures.pop();
+    assert_eq!(waiting_objects(&ctx).unwrap(), 0);
+    let taken = descriptor_slots(&ctx);
+    for _ in 0..3 {
+        let error = ctx.create_swapchain(&SwapchainDesc::default()).unwrap_err();
+        assert!(matches!(error, Error::LimitExceeded { .. }), "{error:?}");
+        assert_eq!(descriptor_slots(&ctx), taken);
+    }
+    drop(textures);
+    assert_eq!(waiting_objects(&ctx).unwrap(), 0);
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    present_until_visible(&ctx, *swapchain, &window, GREEN);
+}
+
+/// The submission that should wait for an acquired image failed, so its semaphore stays signalled: the validation layer would report
+/// another acquisition with it.
+#[test]
+fn the_semaphore_of_a_submission_that_failed_is_not_used_again() {
+    for in_another_window in [false, true] {
+        let Some((window, ctx)) = with_fault_injection(window) else { return };
+        let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+        let image = ctx.next_image(*swapchain).unwrap().unwrap();
+        let filled = fill(&ctx, image.texture(), RED).unwrap();
+        fail_submission_after(0);
+        let refused = ctx.present(filled, image);
+        assert!(matches!(refused, Err(Error::OutOfDeviceMemory { .. })), "{refused:?}");
+        if in_another_window {
+            ctx.suspend_swapchain(*swapchain).unwrap();
+            ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48]).unwrap();
+        } else {
+            window.resize([50, 40]);
+            ctx.resize_swapchain(*swapchain, [50, 40]).unwrap();
+        }
+        assert!(ctx.next_image(*swapchain).unwrap().is_some());
+    }
 }
 
 #[test]

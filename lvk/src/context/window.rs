@@ -150,7 +150,7 @@ impl Context {
         if let Some(semaphore) = resources.signalled.take() {
             resources.recycle_semaphore(semaphore, submission.value);
         }
-        shared.submitter.explain_loss(lifecycle.record_present(answer))?;
+        shared.submitter.explain_loss(lifecycle.record_present(&swapchain.name, answer))?;
         Ok(submission)
     }
 
@@ -183,12 +183,7 @@ impl Context {
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let suspended = lifecycle.suspend(&object.name, &mut live);
         self.device_state().submitter.explain_loss(suspended)?;
-        if resources.is_released_surface_kept() {
-            let message = "views of its images, or command buffers that were not submitted, keep its surface; drop \
-                           them before its window goes";
-            return Err(Error::usage(&*object.name, message));
-        }
-        Ok(())
+        if resources.is_released_surface_kept() { Err(surface_is_kept(&object.name)) } else { Ok(()) }
     }
 
     /// Continues a swapchain in `window`: another one, or its own, which the window system has given back. Creates
@@ -293,6 +288,13 @@ impl Context {
     }
 }
 
+/// Returns the error for a surface that was released and is still there.
+fn surface_is_kept(swapchain: &str) -> Error {
+    let message = "views of its images, or command buffers that were not submitted, keep its surface; drop them before \
+                   its window goes or has another surface";
+    Error::usage(swapchain, message)
+}
+
 /// A locked swapchain with the context and name that its images are created with.
 struct LiveBackend<'a> {
     ctx: &'a Context,
@@ -312,7 +314,9 @@ impl PresentBackend for LiveBackend<'_> {
             return Ok(());
         }
         let is_loss = |result: &Result<()>| matches!(result, Err(Error::DeviceLost { .. }));
-        let mut released = self.resources.wait_for_presents();
+        // The first call that finds the device lost is in the report, and the next may find that too.
+        let waited = self.resources.wait_for_presents();
+        let mut released = self.ctx.device_state().submitter.explain_loss(waited);
         if released.is_ok() || is_loss(&released) {
             released = released.and(self.retire_current());
             let idle = self.ctx.wait_idle();
@@ -334,9 +338,11 @@ impl PresentBackend for LiveBackend<'_> {
         let (offered_modes, plan) = self.choose_chain(&surface, &surface.state()?, extent)?;
         let old = self.resources.current.as_ref().map(|current| Arc::clone(&current.chain));
         let made = Chain::new(&surface, &plan, old.as_deref(), self.name);
-        // The first call that finds the device lost is in the report, and the next may find that too.
         let made = made.map_err(|failure| match failure {
             Failure::Other(error) => Failure::Other(self.ctx.device_state().submitter.explain_error(error)),
+            Failure::WindowInUse if self.resources.is_released_surface_kept() => {
+                Failure::Other(surface_is_kept(self.name))
+            }
             of_window => of_window,
         });
         let retired = self.retire_current();
@@ -435,13 +441,23 @@ impl LiveBackend<'_> {
             match self.new_image(chain, plan, raw) {
                 Ok(image) => images.push(image),
                 Err(error) => {
-                    // No image is acquired, so there is no wait that can fail.
-                    let (_, _released) = self.retire_images(images);
+                    self.free_unused_images(images);
                     return Err(error.into());
                 }
             }
         }
         Ok(images)
+    }
+
+    /// Destroys images that no caller has seen, and so no command, at once: they keep a `VkSwapchainKHR` of the window, which another
+    /// try cannot have beside it.
+    fn free_unused_images(&self, images: Vec<ChainImage>) {
+        let shared = self.ctx.device_state();
+        for image in images {
+            if shared.store.textures.remove(image.texture).is_ok() {
+                shared.free_now(DeferredObject::Texture(image.object));
+            }
+        }
     }
 
     /// Creates the texture of one swapchain image, with a slot of its own.
@@ -474,11 +490,11 @@ impl LiveBackend<'_> {
         let (syncs, released) = self.retire_images(current.images);
         self.resources.retire(current.chain, syncs);
         if let Some(semaphore) = self.resources.signalled.take() {
-            // Without a wait the semaphore stays signalled, so no other acquisition may have it.
-            let free_at = match &released {
-                Ok(()) => self.ctx.device_state().submitter.last_of_queues()[0],
-                Err(_) => u64::MAX,
-            };
+            // Without a wait the semaphore stays signalled, so no other acquisition may have it. The wait was in a submission that
+            // failed, or could not be submitted.
+            let submitter = &self.ctx.device_state().submitter;
+            let is_waited_for = released.is_ok() && !submitter.is_broken();
+            let free_at = if is_waited_for { submitter.last_of_queues()[0] } else { u64::MAX };
             self.resources.recycle_semaphore(semaphore, free_at);
         }
         released

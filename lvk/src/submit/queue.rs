@@ -364,6 +364,11 @@ impl<T> Submitter<T> {
         self.lock().queue_sync.last_values().iter().copied().max().unwrap_or_default()
     }
 
+    /// True if a submission has failed, and so none follows.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.lock().broken.is_some()
+    }
+
     /// Returns the value of the last submission of each queue.
     pub(crate) fn last_of_queues(&self) -> PerQueue<u64> {
         *self.lock().queue_sync.last_values()

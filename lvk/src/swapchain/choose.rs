@@ -80,6 +80,8 @@ pub(crate) enum Failure {
     OutOfDate,
     /// The surface is lost, though the window may still exist.
     SurfaceLost,
+    /// Another swapchain, or another program, has the window.
+    WindowInUse,
     /// An error that a new swapchain does not resolve.
     Other(Error),
 }
@@ -92,11 +94,7 @@ impl Failure {
                 Self::OutOfDate
             }
             vk::Result::ERROR_SURFACE_LOST_KHR => Self::SurfaceLost,
-            vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR => {
-                let message =
-                    "the window has another swapchain, or another program draws to it; destroy that first";
-                Self::Other(Error::usage("window", message))
-            }
+            vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR => Self::WindowInUse,
             result => Self::Other(Error::vulkan(call, name)(result)),
         }
     }
@@ -108,6 +106,11 @@ impl Failure {
         match self {
             Self::OutOfDate => Error::usage(name, "its window is changing; try again"),
             Self::SurfaceLost => Error::SurfaceLost { swapchain: name.to_owned() },
+            Self::WindowInUse => {
+                let message =
+                    "its window has another swapchain, or another program draws to it; destroy that first";
+                Error::usage(name, message)
+            }
             Self::Other(error) => error,
         }
     }
@@ -234,11 +237,12 @@ mod tests {
         assert!(matches!(of(vk::Result::ERROR_OUT_OF_DATE_KHR), Failure::OutOfDate));
         assert!(matches!(of(vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT), Failure::OutOfDate));
         assert!(matches!(of(vk::Result::ERROR_SURFACE_LOST_KHR), Failure::SurfaceLost));
+        let in_use = of(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR).into_error("main window").to_string();
+        assert!(in_use.contains("main window") && in_use.contains("another swapchain"), "{in_use}");
         let text = |result| match of(result) {
             Failure::Other(error) => error.to_string(),
             other => panic!("{other:?}"),
         };
-        assert!(text(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR).contains("another swapchain"));
         assert!(text(vk::Result::ERROR_DEVICE_LOST).contains("vkAcquireNextImageKHR"));
         assert!(text(vk::Result::ERROR_OUT_OF_HOST_MEMORY).contains("host memory"));
     }

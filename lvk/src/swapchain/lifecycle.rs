@@ -129,7 +129,7 @@ impl SwapchainState {
                     log::warn!("{}: its window supports no other surface: {error}", readable_name(name));
                     return Err(Failure::SurfaceLost.into_error(name));
                 }
-                Err(Failure::Other(error)) => return Err(error),
+                Err(failure) => return Err(failure.into_error(name)),
             }
         }
         Ok(None)
@@ -205,14 +205,14 @@ impl SwapchainState {
         self.acquired.filter(|_| ticket == self.tickets)
     }
 
-    /// Records a present and its result, which is true for a suboptimal swapchain.
-    pub(crate) fn record_present(&mut self, answer: Result<bool, Failure>) -> Result<()> {
+    /// Records a present of the swapchain `name` and its result, which is true for a suboptimal swapchain.
+    pub(crate) fn record_present(&mut self, name: &str, answer: Result<bool, Failure>) -> Result<()> {
         self.acquired = None;
         match (self.status, answer) {
             (SwapchainStatus::Suspended | SwapchainStatus::SurfaceReleased, _) => {}
-            (_, Err(Failure::Other(error))) => {
+            (_, Err(failure @ (Failure::Other(_) | Failure::WindowInUse))) => {
                 self.status = SwapchainStatus::OutOfDate;
-                return Err(error);
+                return Err(failure.into_error(name));
             }
             (SwapchainStatus::SurfaceLost, _) | (_, Err(Failure::SurfaceLost)) => {
                 self.status = SwapchainStatus::SurfaceLost;
@@ -440,7 +440,7 @@ mod tests {
             assert_eq!(state.acquired_index(acquired.ticket - 1), None, "an older ticket is worth nothing");
             if matches!(frame, ScriptedFrame::Present) {
                 let answer = backend.present(acquired.index);
-                state.record_present(answer).unwrap();
+                state.record_present("window", answer).unwrap();
                 assert_eq!(state.acquired_index(acquired.ticket), None);
             }
         }
@@ -480,7 +480,7 @@ mod tests {
                 prop_assert_eq!(state.extent(), Some(backend.window));
                 prop_assert_eq!(backend.images, Some(backend.window));
                 let answer = backend.present(acquired.index);
-                state.record_present(answer).unwrap();
+                state.record_present("window", answer).unwrap();
             }
             prop_assert_eq!(backend.rebuilds, rebuilds);
         }
@@ -506,7 +506,7 @@ mod tests {
         suspend_or_resume(&mut state, &mut backend);
         assert_eq!(state.acquired_index(first.ticket), None);
         state.mark_out_of_date();
-        state.record_present(Err(Failure::OutOfDate)).unwrap();
+        state.record_present("window", Err(Failure::OutOfDate)).unwrap();
         assert_eq!(state.acquire_image("window", &mut backend).unwrap(), None);
         assert!(state.is_suspended() && !backend.has_surface);
         backend.window = [3, 5];
@@ -592,7 +592,7 @@ mod tests {
             assert!(!matches!(error, Error::SurfaceLost { .. }), "{error:?}");
             assert!(error.to_string().contains("vkCreateXcbSurfaceKHR"), "{error}");
         }
-        backend.creation_fails = Some(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR);
+        backend.creation_fails = Some(vk::Result::ERROR_INITIALIZATION_FAILED);
         let error = state.acquire_image("window", &mut backend).unwrap_err();
         assert!(matches!(error, Error::SurfaceLost { .. }), "{error:?}");
         backend.creation_fails = None;
@@ -642,6 +642,9 @@ mod tests {
         let (mut state, mut backend) = (SwapchainState::new(), Scripted::new(Vec::new()));
         state.acquire_image("window", &mut backend).unwrap();
         let lost = Error::device_lost("vkQueuePresentKHR", "main window");
-        assert!(matches!(state.record_present(Err(Failure::Other(lost))), Err(Error::DeviceLost { .. })));
+        assert!(matches!(
+            state.record_present("window", Err(Failure::Other(lost))),
+            Err(Error::DeviceLost { .. })
+        ));
     }
 }

@@ -10,7 +10,7 @@ use crate::swapchain::choose::Failure;
 /// Makes the library believe that the presentation engine has lost the surface of a window.
 pub fn lose_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<()> {
     let swapchain = ctx.device_state().store.swapchains.get(swapchain)?;
-    swapchain.lock().lifecycle.record_present(Err(Failure::SurfaceLost))
+    swapchain.lock().lifecycle.record_present("window", Err(Failure::SurfaceLost))
 }
 
 /// Makes the library believe that the presentation engine never finishes one of the images that were presented last.
