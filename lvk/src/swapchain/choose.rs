@@ -105,7 +105,7 @@ impl Failure {
     pub(crate) fn into_error(self, name: &str) -> Error {
         match self {
             Self::OutOfDate => Error::usage(name, "its window is changing; try again"),
-            Self::SurfaceLost => Error::SurfaceLost { swapchain: name.to_owned() },
+            Self::SurfaceLost => Error::SurfaceLost { swapchain: name.to_owned(), source: None },
             Self::WindowInUse => {
                 let message =
                     "its window has another swapchain, or another program draws to it; destroy that first";

@@ -123,11 +123,15 @@ impl SwapchainState {
                     lost = true;
                     self.status = SwapchainStatus::SurfaceLost;
                 }
+                // A driver may answer with any error for a window that is gone. A lost device is none of the window.
                 Err(Failure::Other(error))
-                    if self.status == SwapchainStatus::SurfaceReleased && is_refusal(&error) =>
+                    if self.status == SwapchainStatus::SurfaceReleased
+                        && !matches!(error, Error::DeviceLost { .. }) =>
                 {
-                    log::warn!("{}: its window supports no other surface: {error}", readable_name(name));
-                    return Err(Failure::SurfaceLost.into_error(name));
+                    return Err(Error::SurfaceLost {
+                        swapchain: name.to_owned(),
+                        source: Some(Box::new(error)),
+                    });
                 }
                 Err(failure) => return Err(failure.into_error(name)),
             }
@@ -242,11 +246,6 @@ impl SwapchainState {
     pub(crate) fn extent(&self) -> Option<[u32; 2]> {
         self.extent
     }
-}
-
-/// True if a window refuses a surface; false if memory lacks or the device is lost, which the caller must hear as such.
-fn is_refusal(error: &Error) -> bool {
-    !error.lacks_memory() && !matches!(error, Error::DeviceLost { .. })
 }
 
 enum RecreateStep<T> {
@@ -576,9 +575,9 @@ mod tests {
         assert!(matches!(error, Error::SurfaceLost { .. }), "{error:?}");
     }
 
-    /// A window of a lost surface is not gone where memory lacks for another one, or where the device is lost. The next call tries again.
+    /// Drivers answer with a shortage of memory for windows that are gone too. The cause is in the error, and the next call tries again.
     #[test]
-    fn a_surface_that_no_memory_is_left_for_is_asked_for_again() {
+    fn the_cause_is_told_where_a_window_takes_no_other_surface() {
         let mut state = SwapchainState::new();
         state.status = SwapchainStatus::SurfaceLost;
         let mut backend = Refusing { takes_surface: true, ..Default::default() };
@@ -589,12 +588,15 @@ mod tests {
         ] {
             backend.creation_fails = Some(result);
             let error = state.acquire_image("window", &mut backend).unwrap_err();
-            assert!(!matches!(error, Error::SurfaceLost { .. }), "{error:?}");
             assert!(error.to_string().contains("vkCreateXcbSurfaceKHR"), "{error}");
+            let is_lost_device = matches!(error, Error::DeviceLost { .. });
+            assert_eq!(is_lost_device, result == vk::Result::ERROR_DEVICE_LOST, "{error:?}");
+            assert_eq!(
+                matches!(error, Error::SurfaceLost { source: Some(_), .. }),
+                !is_lost_device,
+                "{error:?}"
+            );
         }
-        backend.creation_fails = Some(vk::Result::ERROR_INITIALIZATION_FAILED);
-        let error = state.acquire_image("window", &mut backend).unwrap_err();
-        assert!(matches!(error, Error::SurfaceLost { .. }), "{error:?}");
         backend.creation_fails = None;
         let error = state.acquire_image("window", &mut backend).unwrap_err();
         assert!(backend.has_surface && matches!(error, Error::Unsupported { .. }), "{error:?}");
