@@ -36,10 +36,17 @@ impl SystemVulkan {
         found
     }
 
-    /// True if a validation layer of at least [`MIN_LAYER_VERSION`] is installed.
+    /// True if a validation layer of at least [`MIN_LAYER_VERSION`] is installed. Warns if the system's loader does not tell.
     pub(super) fn has_current_layer(&self) -> bool {
         // SAFETY: enumeration has no preconditions.
-        let layers = unsafe { self.entry.enumerate_instance_layer_properties() }.unwrap_or_default();
+        let layers = unsafe { self.entry.enumerate_instance_layer_properties() };
+        let layers = layers.unwrap_or_else(|error| {
+            eprintln!(
+                "warning: the downloaded validation layer is used: {error} in vkEnumerateInstanceLayerProperties of the \
+                 system's Vulkan loader"
+            );
+            Vec::new()
+        });
         layers.iter().any(|layer| {
             layer.layer_name_as_c_str() == Ok(LAYER_NAME) && layer.spec_version >= MIN_LAYER_VERSION
         })

@@ -8,16 +8,15 @@ use lvk_samples::app::loading::LoadThread;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::app::run_error::RunError;
 
-use crate::config::ViewerConfig;
 use crate::light::Environment;
 use crate::model::load;
-use crate::viewer::{Viewer, ViewerScene};
+use crate::viewer::{UploadedScene, ViewerScene};
 
 /// What becomes of dropped files.
 #[derive(Default)]
 pub(crate) struct DroppedFile {
     /// Loads the last one.
-    thread: Option<LoadThread<Result<Viewer, RunError>>>,
+    thread: Option<LoadThread<Result<UploadedScene, RunError>>>,
     /// Why the last one cannot be shown.
     error: Option<String>,
 }
@@ -30,7 +29,7 @@ impl DroppedFile {
         ctx: &Context,
         path: &Path,
         light: (&Environment, f32),
-        config: &ViewerConfig,
+        texture_budget: Option<u64>,
     ) {
         // A thread from before ends first.
         (self.thread, self.error) = (None, None);
@@ -39,7 +38,7 @@ impl DroppedFile {
             path: path.to_owned(),
             environment: light.0.clone(),
             disc_radius: light.1,
-            config: *config,
+            texture_budget,
         };
         match LoadThread::start(move |progress| request.load(progress)) {
             Ok(thread) => self.thread = Some(thread),
@@ -47,12 +46,12 @@ impl DroppedFile {
         }
     }
 
-    /// Takes the viewer of a file that is loaded. An error stays for the panel.
-    pub(crate) fn take(&mut self) -> Option<Viewer> {
+    /// Takes the scene of a file that is loaded. An error stays for the panel.
+    pub(crate) fn take(&mut self) -> Option<UploadedScene> {
         let loaded = self.thread.as_mut()?.take()?;
         self.thread = None;
         match loaded {
-            Ok(viewer) => Some(viewer),
+            Ok(scene) => Some(scene),
             Err(error) => {
                 let error = error.to_string();
                 warn(std::slice::from_ref(&error));
@@ -82,19 +81,19 @@ struct Request {
     path: PathBuf,
     environment: Environment,
     disc_radius: f32,
-    config: ViewerConfig,
+    texture_budget: Option<u64>,
 }
 
 impl Request {
-    fn load(self, progress: &mut Progress) -> Result<Viewer, RunError> {
+    fn load(self, progress: &mut Progress) -> Result<UploadedScene, RunError> {
         let model = load(&self.path, progress).map_err(RunError::input)?;
         progress.go_on()?;
         progress.stage("uploading the model and building acceleration structures", 0);
         warn(&model.warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
-        let Self { ctx, path, environment, disc_radius, config } = self;
+        let Self { ctx, path, environment, disc_radius, texture_budget } = self;
         let scene = ViewerScene { name: lvk::readable_name(&path), model, environment, disc_radius };
-        let viewer = Viewer::new(&ctx, scene, &config)?;
-        warn(viewer.warnings());
-        Ok(viewer)
+        let scene = UploadedScene::new(&ctx, scene, texture_budget)?;
+        warn(scene.warnings());
+        Ok(scene)
     }
 }

@@ -43,6 +43,43 @@ pub struct ViewerScene {
     pub disc_radius: f32,
 }
 
+/// A scene on the GPU.
+pub(crate) struct UploadedScene {
+    name: String,
+    gpu: GpuScene,
+    environment: Environment,
+    disc_radius: f32,
+    bounds: Bounds,
+    /// Never empty.
+    cameras: Vec<ModelCamera>,
+    /// How long uploads and builds took.
+    time: Duration,
+}
+
+impl UploadedScene {
+    /// Uploads a scene, and builds its acceleration structures. `texture_budget`: as in [`ViewerConfig`].
+    pub(crate) fn new(
+        ctx: &Context,
+        scene: ViewerScene,
+        texture_budget: Option<u64>,
+    ) -> Result<Self, SampleError> {
+        let start = Instant::now();
+        let ViewerScene { name, model, environment, disc_radius } = scene;
+        let shown = model.default_scene.unwrap_or(0);
+        let pose = model.pose(None, 0.0);
+        let bounds = model::bounds(&model, shown, &pose);
+        let light = (&environment, disc_radius);
+        let gpu = GpuScene::new(ctx, (model, shown), &pose, light, &bounds, texture_budget)?;
+        let cameras = model::cameras_around(gpu.rig(), shown, &pose, &bounds);
+        Ok(Self { name, gpu, environment, disc_radius, bounds, cameras, time: start.elapsed() })
+    }
+
+    /// What does not look as the model says.
+    pub(crate) fn warnings(&self) -> &[String] {
+        &self.gpu.warnings
+    }
+}
+
 /// Durations of the parts of [`Viewer::new`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PreparationTimes {
@@ -95,27 +132,15 @@ impl Viewer {
     /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
     pub fn new(ctx: &Context, scene: ViewerScene, config: &ViewerConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
-        let ViewerScene { name, model, environment, disc_radius } = scene;
         let target = RenderTarget::storage(ctx, config.extent())?;
-        let start = Instant::now();
-        let shown = model.default_scene.unwrap_or(0);
-        let pose = model.pose(None, 0.0);
-        let bounds = model::bounds(&model, shown, &pose);
-        let gpu = GpuScene::new(
-            ctx,
-            (model, shown),
-            &pose,
-            (&environment, disc_radius),
-            &bounds,
-            config.texture_budget,
-        )?;
-        let cameras = model::cameras_around(gpu.rig(), shown, &pose, &bounds);
+        let uploaded = UploadedScene::new(ctx, scene, config.texture_budget)?;
+        let UploadedScene { name, gpu, environment, disc_radius, bounds, cameras, time } = uploaded;
         let camera = cameras[0].camera;
-        let built = Instant::now();
+        let start = Instant::now();
         let occludes = config.occludes(gpu.instance_count());
         let (renderer, present) = (Renderer::new(ctx, config, occludes)?, Present::new(ctx)?);
         Ok(Self {
-            preparation: PreparationTimes { scene: built - start, pipelines: built.elapsed() },
+            preparation: PreparationTimes { scene: time, pipelines: start.elapsed() },
             scene: gpu,
             renderer,
             present,
@@ -139,6 +164,31 @@ impl Viewer {
             frame_number: 0,
             drawn: DrawnCounts::default(),
         })
+    }
+
+    /// Shows another scene by the same pipelines and settings. Its first camera looks, and no animation plays. On failure the scene from
+    /// before stays.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn show(&mut self, scene: ViewerScene) -> Result<(), SampleError> {
+        let uploaded = UploadedScene::new(&self.ctx, scene, self.config.texture_budget)?;
+        self.show_uploaded(uploaded)
+    }
+
+    fn show_uploaded(&mut self, uploaded: UploadedScene) -> Result<(), SampleError> {
+        let occludes = self.config.occludes(uploaded.gpu.instance_count());
+        self.renderer.set_occlusion(&self.ctx, occludes)?;
+        let UploadedScene { name, gpu, environment, disc_radius, bounds, cameras, time } = uploaded;
+        self.preparation = PreparationTimes { scene: time, pipelines: Duration::ZERO };
+        (self.name, self.scene, self.bounds) = (name, gpu, bounds);
+        (self.environment, self.disc_radius) = (environment, disc_radius);
+        (self.camera, self.before) = (cameras[0].camera, cameras[0].camera);
+        (self.cameras, self.chosen) = (cameras, 0);
+        (self.playback, self.drawn) = (Playback::default(), DrawnCounts::default());
+        self.has_warned_of_textures = false;
+        self.begin();
+        Ok(())
     }
 
     /// Returns how long the uploads, the builds and the pipelines took.
@@ -195,12 +245,9 @@ impl Viewer {
 
     /// Shows a dropped file in place of the model, once it is loaded.
     pub(crate) fn take_dropped(&mut self) {
-        let Some(mut loaded) = self.dropped.take() else { return };
-        match loaded.configure(&self.config) {
-            Ok(()) => {
-                loaded.has_chosen_camera = true;
-                *self = loaded;
-            }
+        let Some(loaded) = self.dropped.take() else { return };
+        match self.show_uploaded(loaded) {
+            Ok(()) => self.has_chosen_camera = true,
             Err(error) => self.refused = Some(error.to_string()),
         }
     }

@@ -39,7 +39,7 @@ impl Viewer {
     }
 
     /// Begins a picture anew.
-    fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         (self.done, self.frame_number, self.before) = (0, 0, self.camera);
     }
 
@@ -164,7 +164,7 @@ impl Sample for Viewer {
 
     fn drop_file(&mut self, path: &Path) {
         let light = (&self.environment, self.disc_radius);
-        self.dropped.load(&self.ctx, path, light, &self.config);
+        self.dropped.load(&self.ctx, path, light, self.config.texture_budget);
     }
 
     #[cfg(feature = "window")]

@@ -17,7 +17,7 @@ use lvk_viewer::{IndirectLight, Method, Viewer, ViewerConfig};
 
 use crate::paths::assert_alike;
 use crate::radiance_cache::{dark, lamp, walls};
-use crate::scenes::{Builder, View, assert_close, colored, matte, mean, radiance, viewer};
+use crate::scenes::{Builder, View, assert_close, colored, config, configured_viewer, matte, mean, radiance};
 use crate::still_life::still_life;
 
 /// Distance up to which surfaces take ambient light from each other, over the diagonal of the scene.
@@ -30,10 +30,9 @@ fn occluded(
     environment: &Environment,
     view: &View,
 ) -> Viewer {
-    let mut viewer = viewer(ctx, (Method::Hybrid, path), model, environment, view);
     let indirect = IndirectLight::AmbientOcclusion;
-    viewer.configure(&ViewerConfig { indirect, ..*viewer.config() }).unwrap();
-    viewer
+    let config = ViewerConfig { indirect, ..config((Method::Hybrid, path), view) };
+    configured_viewer(ctx, &config, model, environment, view)
 }
 
 /// Returns the eye that looks at a place on the ground.

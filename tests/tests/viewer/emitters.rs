@@ -10,7 +10,7 @@ use lvk_samples::scene::Camera;
 use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::Environment;
 
-use crate::scenes::{Builder, View, assert_close, colored, matte, mean, radiance};
+use crate::scenes::{Builder, PathTracer, View, assert_close, colored, matte, mean, radiance};
 
 fn floor(material: Material) -> Builder {
     Builder::default().quad(Vec3::new(-40.0, 0.0, -40.0), Vec3::Z * 80.0, Vec3::X * 80.0, material)
@@ -44,12 +44,13 @@ fn small_lights_light_as_their_form_factor() {
 fn a_light_just_above_the_floor_lights_it_beside_as_its_form_factor() {
     let Some(ctx) = software_device() else { return };
     let glowing = Material { emissive: [1.0, 2.0, 3.0], emissive_strength: 10.0, ..matte([0.0; 3]) };
+    let mut tracer = PathTracer::new(&ctx);
     for (near, height) in [(0.05, 0.02), (0.2, 0.02), (0.5, 0.02)] {
         let lamp = Vec3::new(near, height, -0.6);
         let model = floor(matte([0.6; 3])).quad(lamp, Vec3::X * 1.2, Vec3::Z * 1.2, glowing.clone()).model();
         let camera = Camera::looking_at([0.0, 1.5, 0.0001], [0.0; 3], 0.2);
         let view = View { camera, size: [8, 8], samples: 512 };
-        let actual = mean(&radiance(&ctx, RayPath::Query, &model, &Environment::uniform([0.0; 3]), &view));
+        let actual = mean(&tracer.radiance(&model, &Environment::uniform([0.0; 3]), &view));
         let corner = |a: f32, b| corner_factor([f64::from(a), b], f64::from(height));
         let factor = 2.0 * (corner(near + 1.2, 0.6) - corner(near, 0.6));
         let expected = [1.0, 2.0, 3.0].map(|light| 0.6 * 10.0 * factor * light);
@@ -96,9 +97,10 @@ fn shadow_rays_and_paths_find_the_same_light() {
     let Some(ctx) = software_device() else { return };
     let camera = Camera::looking_at([0.6, 1.6, 3.6], [0.0, 0.5, 0.0], 45.0);
     // Shadow rays do not look for surfaces that may have holes, though these have none.
-    let light = |alpha_mode, samples| {
+    let mut tracer = PathTracer::new(&ctx);
+    let mut light = |alpha_mode, samples| {
         let view = View { camera, size: [24, 16], samples };
-        radiance(&ctx, RayPath::Query, &room(alpha_mode), &Environment::uniform([0.05; 3]), &view)
+        tracer.radiance(&room(alpha_mode), &Environment::uniform([0.05; 3]), &view)
     };
     let by_chance = light(AlphaMode::Blend, 4096);
     let found = light(AlphaMode::Opaque, 1024);

@@ -20,7 +20,9 @@ use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::{Content, Method, PrimaryVisibility, ViewerConfig};
 
-use crate::scenes::{Builder, View, assert_close, matte, mean, radiance_by, viewer};
+use crate::scenes::{
+    Builder, View, assert_close, config, configured_viewer, matte, mean, radiance_by, viewer,
+};
 use crate::still_life::still_life;
 
 const SIZE: [u32; 2] = [96, 64];
@@ -123,15 +125,16 @@ fn the_smallest_mip_of_an_image_of_odd_sides_has_its_light() {
 fn rays_find_the_surfaces_that_the_rasteriser_finds() {
     let Some(ctx) = software_device() else { return };
     let model = still_life();
-    let shown = |primary, content| {
-        let mut viewer = viewer(&ctx, (Method::Hybrid, RayPath::Query), &model, &environment(), &view(1));
-        viewer.configure(&ViewerConfig { primary, content, ..*viewer.config() }).unwrap();
-        headless::picture(&mut viewer).unwrap();
-        viewer.radiance().unwrap()
-    };
+    let mut viewers = [PrimaryVisibility::Rays, PrimaryVisibility::Raster].map(|primary| {
+        let config = ViewerConfig { primary, ..config((Method::Hybrid, RayPath::Query), &view(1)) };
+        configured_viewer(&ctx, &config, &model, &environment(), &view(1))
+    });
     for content in [Content::Normals, Content::Roughness, Content::Albedo] {
-        let [rays, raster] =
-            [PrimaryVisibility::Rays, PrimaryVisibility::Raster].map(|primary| shown(primary, content));
+        let [rays, raster] = viewers.each_mut().map(|viewer| {
+            viewer.configure(&ViewerConfig { content, ..*viewer.config() }).unwrap();
+            headless::picture(viewer).unwrap();
+            viewer.radiance().unwrap()
+        });
         let differ = |(a, b): (&[f32; 3], &[f32; 3])| a.iter().zip(b).any(|(a, b)| (a - b).abs() > 0.02);
         let differing = rays.iter().zip(&raster).filter(|pixels| differ(*pixels)).count();
         assert!(100 * differing < rays.len(), "{content:?}: {differing} of {}", rays.len());

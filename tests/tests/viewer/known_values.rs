@@ -5,12 +5,11 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 use lvk_gltf::{AlphaMode, Light, LightKind, Material, Model, Transmission, Volume};
-use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, Sun};
 
-use crate::scenes::{Builder, View, assert_close, colored, matte, mean, radiance};
+use crate::scenes::{Builder, PathTracer, View, assert_close, colored, matte, mean};
 
 /// Looks at the origin from above, a little from the side, at an area small enough to be evenly lit.
 fn above(height: f32) -> View {
@@ -21,9 +20,8 @@ fn floor(material: Material) -> Builder {
     Builder::default().quad(Vec3::new(-40.0, 0.0, -40.0), Vec3::Z * 80.0, Vec3::X * 80.0, material)
 }
 
-fn seen(model: &Model, environment: &Environment, view: &View) -> Option<[f64; 3]> {
-    let ctx = software_device()?;
-    Some(mean(&radiance(&ctx, RayPath::Query, model, environment, view)))
+fn seen(tracer: &mut PathTracer<'_>, model: &Model, environment: &Environment, view: &View) -> [f64; 3] {
+    mean(&tracer.radiance(model, environment, view))
 }
 
 fn lit_by_sun(radius: f32) -> Environment {
@@ -34,9 +32,11 @@ fn lit_by_sun(radius: f32) -> Environment {
 
 #[test]
 fn sun_and_sky_light_a_matte_floor() {
+    let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let model = floor(matte([0.5, 0.4, 0.25])).model();
     for radius in [0.004, 0.3] {
-        let Some(actual) = seen(&model, &lit_by_sun(radius), &above(5.0)) else { return };
+        let actual = seen(&mut tracer, &model, &lit_by_sun(radius), &above(5.0));
         // A disc gives its irradiance to a surface that faces it, and the cosine of its middle to another.
         let expected = [(0.5, 3.0, 0.1), (0.4, 2.0, 0.2), (0.25, 1.0, 0.3)]
             .map(|(albedo, sun, sky)| albedo * (sun * 0.8 / PI + sky));
@@ -46,13 +46,15 @@ fn sun_and_sky_light_a_matte_floor() {
 
 #[test]
 fn light_goes_straight_on_through_a_pane() {
+    let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let color = [0.9, 0.6, 0.3];
     let transmission = Some(Transmission { factor: 1.0, texture: None });
     let pane = Material { transmission, roughness: 0.0, ..matte(color) };
     let model = floor(matte([0.5; 3]))
         .quad(Vec3::new(-40.0, 3.0, -40.0), Vec3::Z * 80.0, Vec3::X * 80.0, pane)
         .model();
-    let Some(actual) = seen(&model, &lit_by_sun(0.1), &above(2.5)) else { return };
+    let actual = seen(&mut tracer, &model, &lit_by_sun(0.1), &above(2.5));
     // A pane without a highlight reflects nothing, so that no light comes back to the floor.
     let expected = [(0.9, 3.0, 0.1), (0.6, 2.0, 0.2), (0.3, 1.0, 0.3)]
         .map(|(color, sun, sky)| 0.5 * color * (sun * 0.8 / PI + sky));
@@ -61,23 +63,27 @@ fn light_goes_straight_on_through_a_pane() {
 
 #[test]
 fn lamps_follow_the_inverse_square() {
+    let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let lamp = |kind| Light { name: None, color: [1.0, 0.5, 0.25], intensity: 12.0, range: None, kind };
     let wide = LightKind::Spot { inner_cone_angle: 0.3, outer_cone_angle: 0.5 };
     for kind in [LightKind::Point, wide] {
         let model = floor(matte([0.8; 3])).lamp(lamp(kind), Vec3::new(0.0, 2.0, 0.0)).model();
-        let Some(actual) = seen(&model, &Environment::uniform([0.0; 3]), &above(1.5)) else { return };
+        let actual = seen(&mut tracer, &model, &Environment::uniform([0.0; 3]), &above(1.5));
         let expected = [1.0, 0.5, 0.25].map(|color| 0.8 / PI * 12.0 * color / 4.0);
         assert_close(&format!("{kind:?}"), actual, expected, 0.01);
     }
     // A lamp beside the axis is outside of a narrow cone.
     let narrow = LightKind::Spot { inner_cone_angle: 0.1, outer_cone_angle: 0.2 };
     let model = floor(matte([0.8; 3])).lamp(lamp(narrow), Vec3::new(1.0, 2.0, 0.0)).model();
-    let Some(actual) = seen(&model, &Environment::uniform([0.0; 3]), &above(1.5)) else { return };
+    let actual = seen(&mut tracer, &model, &Environment::uniform([0.0; 3]), &above(1.5));
     assert_eq!(actual, [0.0; 3]);
 }
 
 #[test]
 fn alpha_is_the_share_of_light_that_meets_a_surface() {
+    let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let shown = |alpha, alpha_mode| {
         let unlit = Material { unlit: true, alpha_mode, ..colored([0.2, 0.4, 0.8], 0.0, 1.0) };
         Material { base_color: [0.2, 0.4, 0.8, alpha], ..unlit }
@@ -90,10 +96,8 @@ fn alpha_is_the_share_of_light_that_meets_a_surface() {
     ];
     for (material, alpha) in cases {
         let what = format!("{:?}", material.alpha_mode);
-        let Some(actual) = seen(&floor(material).model(), &Environment::uniform([2.0; 3]), &above(5.0))
-        else {
-            return;
-        };
+        let actual =
+            seen(&mut tracer, &floor(material).model(), &Environment::uniform([2.0; 3]), &above(5.0));
         let expected = [0.2, 0.4, 0.8].map(|color| alpha * color + (1.0 - alpha) * 2.0);
         assert_close(&what, actual, expected, 0.01);
     }
@@ -101,6 +105,8 @@ fn alpha_is_the_share_of_light_that_meets_a_surface() {
 
 #[test]
 fn a_volume_without_a_boundary_takes_light_by_its_depth() {
+    let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let color = [0.9, 0.5, 0.2];
     let volume = Volume {
         thickness: 1.0,
@@ -112,13 +118,15 @@ fn a_volume_without_a_boundary_takes_light_by_its_depth() {
     let fog = Material { ior: 1.0, transmission, volume: Some(volume), ..colored([1.0; 3], 0.0, 0.0) };
     let model =
         Builder::default().cuboid(Vec3::new(-9.0, -1.5, -9.0), Vec3::new(9.0, 1.5, 9.0), &fog).model();
-    let Some(actual) = seen(&model, &Environment::uniform([1.0; 3]), &above(5.0)) else { return };
+    let actual = seen(&mut tracer, &model, &Environment::uniform([1.0; 3]), &above(5.0));
     let expected = color.map(|color| f64::from(color).powf(3.0 / 2.0));
     assert_close("three units of fog", actual, expected, 0.01);
 }
 
 #[test]
 fn a_lamp_of_triangles_lights_as_its_solid_angle() {
+    let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     // A ceiling that glows and reflects nothing, seen from the floor below its middle.
     let glowing = Material { emissive: [1.0, 2.0, 3.0], double_sided: true, ..matte([0.0; 3]) };
     let half = 2.0;
@@ -126,7 +134,7 @@ fn a_lamp_of_triangles_lights_as_its_solid_angle() {
         .quad(Vec3::new(-half, 1.0, -half), Vec3::X * 2.0 * half, Vec3::Z * 2.0 * half, glowing)
         .model();
     let view = View { samples: 128, ..above(0.9) };
-    let Some(actual) = seen(&model, &Environment::uniform([0.0; 3]), &view) else { return };
+    let actual = seen(&mut tracer, &model, &Environment::uniform([0.0; 3]), &view);
     // Form factor of a square above its middle, four times that of a quarter above its corner.
     let side = f64::from(half);
     let edge = side / (1.0 + side * side).sqrt();
@@ -137,6 +145,8 @@ fn a_lamp_of_triangles_lights_as_its_solid_angle() {
 /// A file with light from a tenth of all directions, around +x and above the horizon, lights walls as its pixels say, turned or not.
 #[test]
 fn an_environment_file_lights_from_its_directions() {
+    let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     const SIZE: [u32; 2] = [64, 32];
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("sky.hdr");
@@ -175,7 +185,7 @@ fn an_environment_file_lights_from_its_directions() {
         let eye = normal * 5.0 + Vec3::new(0.02, 0.01, 0.02);
         let view =
             View { camera: Camera::looking_at(eye.to_array(), [0.0; 3], 0.2), size: [8, 8], samples: 256 };
-        let Some(actual) = seen(&wall(normal), &environment, &view) else { return };
+        let actual = seen(&mut tracer, &wall(normal), &environment, &view);
         let expected = irradiance(normal.as_dvec3().to_array(), turned.into()).map(|sum| 0.5 / PI * sum);
         assert_close(&format!("wall towards {normal}, turned by {turned}"), actual, expected, 0.02);
     }

@@ -5,17 +5,15 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use lvk::Context;
 use lvk_gltf::{
     Anisotropy, Clearcoat, ColorSpace, Image, ImageData, Iridescence, Material, MipLevel, Model, TexelFormat,
     TextureRef,
 };
-use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, Sun};
 
-use crate::scenes::{Builder, View, colored, matte, mean, radiance};
+use crate::scenes::{Builder, PathTracer, View, colored, matte, mean};
 
 /// A floor whose tangent is +x and whose bitangent is -z.
 fn floor(material: Material) -> Model {
@@ -32,10 +30,10 @@ fn with_texel(mut model: Model, texel: [u8; 4]) -> Model {
 const TEXTURE: TextureRef = TextureRef { image: 0, sampler: 0, tex_coord: 0, transform: None };
 
 /// Radiance of the floor from a direction, where a small sun of irradiance 1 lights it from another.
-fn lit(ctx: &Context, model: &Model, view: DVec3, light: DVec3) -> [f64; 3] {
+fn lit(tracer: &mut PathTracer<'_>, model: &Model, view: DVec3, light: DVec3) -> [f64; 3] {
     let sun = Sun { direction: light.as_vec3().to_array(), irradiance: [1.0; 3], radius: 0.005 };
     let environment = Environment { sun: Some(sun), ..Environment::uniform([0.0; 3]) };
-    mean(&radiance(ctx, RayPath::Query, model, &environment, &looking_along(view)))
+    mean(&tracer.radiance(model, &environment, &looking_along(view)))
 }
 
 fn looking_along(view: DVec3) -> View {
@@ -68,6 +66,7 @@ fn brushed(strength: f32, rotation: f32, texture: Option<TextureRef>) -> Materia
 #[test]
 fn highlights_of_brushed_metal_are_long_across_its_direction() {
     let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let (strength, roughness) = (0.7_f64, 0.5_f64);
     let alpha = roughness * roughness;
     let alpha = [alpha + (1.0 - alpha) * strength * strength, alpha];
@@ -90,7 +89,7 @@ fn highlights_of_brushed_metal_are_long_across_its_direction() {
         let view = direction(0.35, 0.3);
         let lights = [0.0, 0.9, 1.6, 2.5, 4.0].map(|azimuth| direction(0.6, azimuth));
         // Light that microfacets send back and forth is added by a factor that is the same for all lights.
-        let seen = lights.map(|light| lit(&ctx, &model, view, light)[2]);
+        let seen = lights.map(|light| lit(&mut tracer, &model, view, light)[2]);
         let fresnel = |light: DVec3| 0.4 + 0.6 * (1.0 - view.dot((view + light).normalize())).powi(5);
         let known = lights.map(|light| fresnel(light) * microfacets([x, y, DVec3::Y], alpha, view, light));
         let shares = |all: [f64; 5]| all.map(|value| value / all.iter().sum::<f64>());
@@ -104,12 +103,13 @@ fn highlights_of_brushed_metal_are_long_across_its_direction() {
 #[test]
 fn brushed_metals_keep_about_all_light() {
     let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     for (strength, roughness) in [(0.3, 0.3), (0.6, 0.2), (0.8, 0.4), (1.0, 0.1), (1.0, 0.5)] {
         let material = Material { roughness, ..brushed(strength, 0.3, None) };
         let model = floor(Material { base_color: [1.0; 4], ..material });
         for view in [direction(0.1, 0.0), direction(0.8, 0.0), direction(0.8, 1.4)] {
             let white = Environment::uniform([1.0; 3]);
-            let bright = mean(&radiance(&ctx, RayPath::Query, &model, &white, &looking_along(view)))[0];
+            let bright = mean(&tracer.radiance(&model, &white, &looking_along(view)))[0];
             eprintln!("strength {strength}, roughness {roughness}, from {view:.2}: {bright:.4}");
             // The compensation is that of a round highlight of the same area.
             assert!((0.9..1.04).contains(&bright), "{bright}");
@@ -164,6 +164,7 @@ fn eye(reflectance: impl Fn(f64) -> f64) -> [f64; 3] {
 #[test]
 fn iridescent_surfaces_have_the_colours_of_interference() {
     let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let (film, ior) = (2.0_f32, 1.5_f32);
     let mut extremes = [f64::MAX, 0.0_f64];
     for thickness in [120.0, 250.0, 400.0, 550.0] {
@@ -179,7 +180,7 @@ fn iridescent_surfaces_have_the_colours_of_interference() {
             let black = Material { ior, iridescence: Some(iridescence), ..colored([0.0; 3], 0.0, 0.0) };
             let view = looking_along(direction(cosine.acos(), 0.4));
             let white = Environment::uniform([1.0; 3]);
-            let seen = mean(&radiance(&ctx, RayPath::Query, &floor(black), &white, &view));
+            let seen = mean(&tracer.radiance(&floor(black), &white, &view));
             let [film, ior, thickness] = [film, ior, thickness].map(f64::from);
             let known = eye(|wavelength| airy(film, ior, thickness, cosine, wavelength));
             eprintln!("{thickness} nm, cosine {cosine}: {seen:.3?}, expected {known:.3?}");
@@ -196,6 +197,7 @@ fn iridescent_surfaces_have_the_colours_of_interference() {
 #[test]
 fn iridescence_neither_adds_nor_loses_light() {
     let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let film = |factor| Iridescence {
         factor,
         texture: None,
@@ -207,10 +209,10 @@ fn iridescence_neither_adds_nor_loses_light() {
     let white = Environment::uniform([1.0; 3]);
     for (factor, roughness) in [(1.0, 0.0), (0.5, 0.4), (1.0, 0.9)] {
         for view in [direction(0.1, 0.0), direction(1.2, 0.0)] {
-            let bright = |metallic| {
+            let mut bright = |metallic| {
                 let material =
                     Material { iridescence: Some(film(factor)), ..colored([1.0; 3], metallic, roughness) };
-                mean(&radiance(&ctx, RayPath::Query, &floor(material), &white, &looking_along(view)))
+                mean(&tracer.radiance(&floor(material), &white, &looking_along(view)))
             };
             // Below a film that reflects less of a colour, a white matte layer gets more of that colour.
             let (plastic, metal) = (bright(0.0), bright(1.0));
@@ -224,6 +226,7 @@ fn iridescence_neither_adds_nor_loses_light() {
 #[test]
 fn a_clear_coat_follows_its_own_normal_map() {
     let Some(ctx) = software_device() else { return };
+    let mut tracer = PathTracer::new(&ctx);
     let texel = [191_u8, 128, 238, 255];
     let coat = Clearcoat {
         factor: 1.0,
@@ -240,7 +243,7 @@ fn a_clear_coat_follows_its_own_normal_map() {
     let view = direction(0.2, 0.5);
     for azimuth in [0.0, 1.0, 3.0] {
         let light = direction(0.7, azimuth);
-        let seen = lit(&ctx, &model, view, light)[1];
+        let seen = lit(&mut tracer, &model, view, light)[1];
         let cosine = view.dot((view + light).normalize());
         let fresnel = 0.04 + 0.96 * (1.0 - cosine).powi(5);
         let known = fresnel * microfacets([along, normal.cross(along), normal], [0.25; 2], view, light);

@@ -68,12 +68,12 @@ fn samples_have_as_many_rays_and_as_much_light_whether_they_are_alone_or_follow_
     let camera = Camera::looking_at([1.5, 1.7, 4.5], [-0.2, 0.5, 0.0], 40.0);
     let environment = Environment::day(&SunSetting::default());
     let model = still_life();
+    let view = View { camera, size: [60, 40], samples: 1 };
+    let mut viewer = viewer(&ctx, (Method::PathTrace, RayPath::Query), &model, &environment, &view);
     // More surfaces take more launches for each sample, which hand each other lists of the paths that go on.
     for bounces in [1, 2, 3, 4, 6, 9, 13] {
         let [alone, many] = [1, 16].map(|samples| {
-            let view = View { camera, size: [60, 40], samples };
-            let mut viewer = viewer(&ctx, (Method::PathTrace, RayPath::Query), &model, &environment, &view);
-            viewer.configure(&ViewerConfig { bounces, ..*viewer.config() }).unwrap();
+            viewer.configure(&ViewerConfig { bounces, samples, ..*viewer.config() }).unwrap();
             headless::picture(&mut viewer).unwrap();
             let rays = viewer.ray_count().unwrap().unwrap() as f64 / f64::from(samples);
             (rays, mean(&viewer.radiance().unwrap()))

@@ -17,7 +17,7 @@ use lvk_viewer::{IndirectLight, Method, Viewer, ViewerConfig};
 
 use crate::moving_model::moving_model;
 use crate::paths::assert_alike;
-use crate::scenes::{Builder, View, assert_close, matte, mean, viewer};
+use crate::scenes::{Builder, View, assert_close, config, configured_viewer, matte, mean, viewer};
 use crate::still_life::still_life;
 
 const SIZE: [u32; 2] = [96, 64];
@@ -66,9 +66,8 @@ fn cached(
     view: &View,
     (_, indirect, cache_entries): (&str, IndirectLight, u32),
 ) -> Viewer {
-    let mut viewer = viewer(ctx, (Method::Hybrid, path), model, environment, view);
-    viewer.configure(&ViewerConfig { indirect, cache_entries, ..*viewer.config() }).unwrap();
-    viewer
+    let config = ViewerConfig { indirect, cache_entries, ..config((Method::Hybrid, path), view) };
+    configured_viewer(ctx, &config, model, environment, view)
 }
 
 fn picture(viewer: &mut Viewer) -> RgbaImage {

@@ -113,18 +113,64 @@ pub fn viewer(
     environment: &Environment,
     view: &View,
 ) -> Viewer {
-    let scene = ViewerScene {
+    configured_viewer(ctx, &config((method, path), view), model, environment, view)
+}
+
+/// Returns the usual configuration.
+pub fn config((method, path): (Method, RayPath), view: &View) -> ViewerConfig {
+    let [width, height] = view.size;
+    let usual = ViewerConfig::new(path, width, height);
+    ViewerConfig { method, samples: view.samples, bounces: BOUNCES, ..usual }
+}
+
+/// Returns the viewer of a model in a configuration.
+pub fn configured_viewer(
+    ctx: &Context,
+    config: &ViewerConfig,
+    model: &Model,
+    environment: &Environment,
+    view: &View,
+) -> Viewer {
+    let mut viewer = Viewer::new(ctx, scene(model, environment), config).unwrap();
+    viewer.set_view(&view.camera);
+    viewer
+}
+
+fn scene(model: &Model, environment: &Environment) -> ViewerScene {
+    ViewerScene {
         name: "test".to_owned(),
         model: model.clone(),
         environment: environment.clone(),
         disc_radius: 0.1,
-    };
-    let [width, height] = view.size;
-    let usual = ViewerConfig::new(path, width, height);
-    let config = ViewerConfig { method, samples: view.samples, bounces: BOUNCES, ..usual };
-    let mut viewer = Viewer::new(ctx, scene, &config).unwrap();
-    viewer.set_view(&view.camera);
-    viewer
+    }
+}
+
+/// The path tracer by queries, which shows one scene after the other: its pipelines take longer to compile than most scenes to render.
+pub struct PathTracer<'a> {
+    ctx: &'a Context,
+    viewer: Option<Viewer>,
+}
+
+impl<'a> PathTracer<'a> {
+    pub fn new(ctx: &'a Context) -> Self {
+        Self { ctx, viewer: None }
+    }
+
+    /// Returns the radiance of each pixel, rows from the top.
+    pub fn radiance(&mut self, model: &Model, environment: &Environment, view: &View) -> Vec<[f32; 3]> {
+        let by = (Method::PathTrace, RayPath::Query);
+        let viewer = match &mut self.viewer {
+            Some(viewer) => {
+                viewer.show(scene(model, environment)).unwrap();
+                viewer.configure(&config(by, view)).unwrap();
+                viewer.set_view(&view.camera);
+                viewer
+            }
+            none => none.insert(viewer(self.ctx, by, model, environment, view)),
+        };
+        headless::picture(viewer).unwrap();
+        viewer.radiance().unwrap()
+    }
 }
 
 /// Returns the radiance of each pixel by the path tracer, rows from the top.

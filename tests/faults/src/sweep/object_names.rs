@@ -22,6 +22,8 @@ pub const UNNAMED_OBJECTS: &[(&str, &[&str])] = &[
     ("pipeline layout", &["vkCreatePipelineLayout"]),
     ("input attachments", &["vkCreateDescriptor", "vkAllocateDescriptorSets"]),
     ("default tlas", MEMORY),
+    // BLAS that software traverses lie in buffers that they share, so Vulkan has no name of one.
+    ("readback of stripes", MEMORY),
     ("fragment sizes", &["vkGetPhysicalDeviceFragmentShadingRatesKHR"]),
     (
         "clocks of device and host",

@@ -1,5 +1,6 @@
 //! Dispatches, each after the one before.
 
+use gpu_allocator::MemoryLocation;
 use lvk::ash::vk;
 
 use super::commands::{Commands, memory_barrier};
@@ -23,10 +24,17 @@ impl Dispatches {
     pub(super) fn new(device: Device, count: u32) -> Result<Self, Failure> {
         let layout = Layout::new(&device, 0, &[(vk::DescriptorType::STORAGE_BUFFER, 1)])?;
         let pipeline = Pipeline::compute(&device, layout, COUNT_COMPUTE)?;
-        let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC;
-        let numbers = Buffer::with_bytes(&device, &[0; 256], usage)?;
+        let copied = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER | copied;
+        let numbers = Buffer::new(&device, 256, usage, MemoryLocation::GpuOnly)?;
         write_buffer(&device, pipeline.set.ok_or("no descriptor set")?, 0, numbers.raw);
-        Ok(Self { commands: Commands::new(&device)?, pipeline, numbers, count, samples: 0, device })
+        let mut commands = Commands::new(&device)?;
+        let list = commands.begin(&device)?;
+        // SAFETY: the buffer can be filled, and nothing uses it yet.
+        unsafe { device.raw.cmd_fill_buffer(list, numbers.raw, 0, vk::WHOLE_SIZE, 0) };
+        commands.submit(&device)?;
+        commands.wait(&device)?;
+        Ok(Self { commands, pipeline, numbers, count, samples: 0, device })
     }
 }
 
