@@ -143,7 +143,7 @@ impl Context {
         shown.sync.drawn_at = submission.value;
         let answer = current.chain.present(index, mode, &shown.sync);
         // Even if the window has changed, the engine waits for the semaphore and signals the fence.
-        shown.sync.presented = !matches!(answer, Err(Failure::Other(_)));
+        shown.sync.presented = !matches!(answer, Err(Failure::Other(_) | Failure::WindowInUse));
         if came_back {
             resources.set_presents_done_at(submission.value);
         }

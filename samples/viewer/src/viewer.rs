@@ -45,14 +45,14 @@ pub struct ViewerScene {
 
 /// A scene on the GPU.
 pub(crate) struct UploadedScene {
-    name: String,
-    gpu: GpuScene,
-    environment: Environment,
-    disc_radius: f32,
+    pub(crate) name: String,
+    pub(crate) gpu: GpuScene,
+    pub(crate) environment: Environment,
+    pub(crate) disc_radius: f32,
     bounds: Bounds,
     /// Never empty.
-    cameras: Vec<ModelCamera>,
-    /// How long uploads and builds took.
+    pub(crate) cameras: Vec<ModelCamera>,
+    /// Time that the uploads and the builds of acceleration structures took.
     time: Duration,
 }
 
@@ -74,7 +74,7 @@ impl UploadedScene {
         Ok(Self { name, gpu, environment, disc_radius, bounds, cameras, time: start.elapsed() })
     }
 
-    /// What does not look as the model says.
+    /// Returns the warnings about parts of the model that look otherwise than the file says.
     pub(crate) fn warnings(&self) -> &[String] {
         &self.gpu.warnings
     }
@@ -92,18 +92,13 @@ pub struct PreparationTimes {
 /// Shows a model.
 pub struct Viewer {
     pub(crate) ctx: Context,
-    pub(crate) name: String,
     pub(crate) config: ViewerConfig,
-    pub(crate) scene: GpuScene,
-    pub(crate) environment: Environment,
-    pub(crate) disc_radius: f32,
+    pub(crate) shown: UploadedScene,
     pub(crate) renderer: Renderer,
     pub(crate) present: Present,
     pub(crate) target: RenderTarget,
-    bounds: Bounds,
     pub(crate) playback: Playback,
-    pub(crate) cameras: Vec<ModelCamera>,
-    /// The camera that looks, by its place among `cameras`.
+    /// The camera that looks, by its place among those of the scene.
     pub(crate) chosen: usize,
     /// True if another was chosen, until the window knows.
     pub(crate) has_chosen_camera: bool,
@@ -121,7 +116,8 @@ pub struct Viewer {
     pub(crate) frame_number: u32,
     /// Instances that culling has left.
     pub(crate) drawn: DrawnCounts,
-    preparation: PreparationTimes,
+    /// Time that the compilation of pipelines took.
+    pipelines_time: Duration,
 }
 
 impl Viewer {
@@ -133,26 +129,20 @@ impl Viewer {
     pub fn new(ctx: &Context, scene: ViewerScene, config: &ViewerConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
         let target = RenderTarget::storage(ctx, config.extent())?;
-        let uploaded = UploadedScene::new(ctx, scene, config.texture_budget)?;
-        let UploadedScene { name, gpu, environment, disc_radius, bounds, cameras, time } = uploaded;
-        let camera = cameras[0].camera;
+        let shown = UploadedScene::new(ctx, scene, config.texture_budget)?;
+        let camera = shown.cameras[0].camera;
         let start = Instant::now();
-        let occludes = config.occludes(gpu.instance_count());
+        let occludes = config.occludes(shown.gpu.instance_count());
         let (renderer, present) = (Renderer::new(ctx, config, occludes)?, Present::new(ctx)?);
         Ok(Self {
-            preparation: PreparationTimes { scene: time, pipelines: start.elapsed() },
-            scene: gpu,
+            pipelines_time: start.elapsed(),
+            shown,
             renderer,
             present,
             ctx: ctx.clone(),
-            name,
             config: *config,
-            environment,
-            disc_radius,
             target,
-            bounds,
             playback: Playback::default(),
-            cameras,
             chosen: 0,
             has_chosen_camera: false,
             dropped: DroppedFile::default(),
@@ -179,14 +169,10 @@ impl Viewer {
     fn show_uploaded(&mut self, uploaded: UploadedScene) -> Result<(), SampleError> {
         let occludes = self.config.occludes(uploaded.gpu.instance_count());
         self.renderer.set_occlusion(&self.ctx, occludes)?;
-        let UploadedScene { name, gpu, environment, disc_radius, bounds, cameras, time } = uploaded;
-        self.preparation = PreparationTimes { scene: time, pipelines: Duration::ZERO };
-        (self.name, self.scene, self.bounds) = (name, gpu, bounds);
-        (self.environment, self.disc_radius) = (environment, disc_radius);
-        (self.camera, self.before) = (cameras[0].camera, cameras[0].camera);
-        (self.cameras, self.chosen) = (cameras, 0);
+        (self.camera, self.chosen) = (uploaded.cameras[0].camera, 0);
+        (self.shown, self.pipelines_time) = (uploaded, Duration::ZERO);
         (self.playback, self.drawn) = (Playback::default(), DrawnCounts::default());
-        self.has_warned_of_textures = false;
+        (self.has_warned_of_textures, self.refused) = (false, None);
         self.begin();
         Ok(())
     }
@@ -194,19 +180,19 @@ impl Viewer {
     /// Returns how long the uploads, the builds and the pipelines took.
     #[must_use]
     pub fn preparation(&self) -> PreparationTimes {
-        self.preparation
+        PreparationTimes { scene: self.shown.time, pipelines: self.pipelines_time }
     }
 
     /// Cameras of the model; never empty.
     #[must_use]
     pub fn cameras(&self) -> &[ModelCamera] {
-        &self.cameras
+        &self.shown.cameras
     }
 
     /// Looks through a camera of the model, by its place in [`cameras`](Self::cameras). Beyond the last it is the last.
     pub fn choose_camera(&mut self, place: usize) {
-        self.chosen = place.min(self.cameras.len() - 1);
-        self.set_camera(&self.cameras[self.chosen].camera.clone());
+        self.chosen = place.min(self.shown.cameras.len() - 1);
+        self.set_camera(&self.shown.cameras[self.chosen].camera.clone());
         self.has_chosen_camera = true;
     }
 
@@ -218,23 +204,27 @@ impl Viewer {
 
     /// Moves everything to where it is at the time that is shown. A camera of a node moves with it.
     pub(crate) fn pose(&mut self) {
-        let pose = self.playback.pose(self.scene.rig());
-        if !self.scene.set_pose(&pose) {
+        let pose = self.playback.pose(self.shown.gpu.rig());
+        if !self.shown.gpu.set_pose(&pose) {
             return;
         }
         self.done = 0;
-        let is_own = self.camera == self.cameras[self.chosen].camera;
-        self.cameras =
-            model::cameras_around(self.scene.rig(), self.scene.scene_number(), &pose, &self.bounds);
+        let is_own = self.camera == self.shown.cameras[self.chosen].camera;
+        self.shown.cameras = model::cameras_around(
+            self.shown.gpu.rig(),
+            self.shown.gpu.scene_number(),
+            &pose,
+            &self.shown.bounds,
+        );
         if is_own {
-            self.set_camera(&self.cameras[self.chosen].camera.clone());
+            self.set_camera(&self.shown.cameras[self.chosen].camera.clone());
         }
     }
 
     /// Name of the model.
     #[must_use]
     pub fn name(&self) -> &str {
-        &self.name
+        &self.shown.name
     }
 
     /// Why the file that was dropped last cannot be shown, if so.
@@ -258,19 +248,19 @@ impl Viewer {
     /// # Errors
     /// [`SampleError::Device`].
     pub fn moved_positions(&self) -> Result<Vec<Vec<[f32; 3]>>, SampleError> {
-        Ok(self.scene.moved_positions(&self.ctx)?)
+        Ok(self.shown.gpu.moved_positions(&self.ctx)?)
     }
 
     /// Triangles of all meshes, each mesh once, and instances of meshes.
     #[must_use]
     pub fn counts(&self) -> (u64, u32) {
-        (self.scene.triangle_count, self.scene.instance_count())
+        (self.shown.gpu.triangle_count, self.shown.gpu.instance_count())
     }
 
     /// Memory of textures; `None` without a budget.
     #[must_use]
     pub fn texture_memory(&self) -> Option<TextureMemory> {
-        self.scene.texture_memory()
+        self.shown.gpu.texture_memory()
     }
 
     /// Instances that the last frame has rasterised; `None` where culling leaves out none. Waits for the frame.
@@ -281,14 +271,14 @@ impl Viewer {
         if !self.config.culls() {
             return Ok(None);
         }
-        self.drawn.read(&self.ctx, self.scene.culling())?;
+        self.drawn.read(&self.ctx, self.shown.gpu.culling())?;
         Ok(self.drawn.known())
     }
 
     /// What the picture leaves out, for the user to read.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
-        &self.scene.warnings
+        self.shown.warnings()
     }
 
     /// The configuration.
@@ -395,19 +385,19 @@ impl Viewer {
         };
         let seen = gpu(&self.camera);
         let addresses = self.renderer.addresses()?;
-        let scene = self.scene.constants(cmd, self.is_first())?;
+        let scene = self.shown.gpu.constants(cmd, self.is_first())?;
         cmd.upload(&FrameConstants {
             camera: seen.for_sample(self.frame_number, u32::MAX),
             scene,
             sums: addresses.sums,
-            light: self.scene.light,
-            tlas: self.scene.tlas.index(),
+            light: self.shown.gpu.light,
+            tlas: self.shown.gpu.tlas.index(),
             image: self.target.image_index(),
             sample_number: if self.config.method == Method::Hybrid { self.frame_number } else { self.done },
             pixel_count: width * height,
             max_bounces: bounces - 1,
             exposure: exposure_stops.exp2(),
-            offset_extent: self.scene.offset_extent,
+            offset_extent: self.shown.gpu.offset_extent,
             tone_mapping: tone_mapping as u32,
             frame_number: self.frame_number,
             seen,
@@ -417,17 +407,21 @@ impl Viewer {
             path_lists: addresses.paths.lists,
             paths: addresses.paths.paths,
             cache: addresses.cache.addresses,
-            wanted_mips: self.scene.wanted_mips().map_or(Ok(0), |buffer| self.ctx.buffer_address(buffer))?,
+            wanted_mips: self
+                .shown
+                .gpu
+                .wanted_mips()
+                .map_or(Ok(0), |buffer| self.ctx.buffer_address(buffer))?,
             ambient_sums: addresses.ambient_sums,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
-            scene_moves: u32::from(self.scene.moves()),
-            emission: self.scene.emission(),
+            scene_moves: u32::from(self.shown.gpu.moves()),
+            emission: self.shown.gpu.emission(),
             cache_buckets: addresses.cache.bucket_count,
             cell_share: cell_share(seen.pixel_spread()),
-            ambient: self.scene.ambient(),
+            ambient: self.shown.gpu.ambient(),
             occlusion_distance: OCCLUSION_SHARE
-                * self.bounds.min.distance(self.bounds.max).max(f32::MIN_POSITIVE),
+                * self.shown.bounds.min.distance(self.shown.bounds.max).max(f32::MIN_POSITIVE),
             _padding: 0,
         })
     }
@@ -439,18 +433,18 @@ impl Viewer {
         count: u32,
         is_shown: bool,
     ) -> lvk::Result<()> {
-        self.scene.record_motion(frame, self.is_first())?;
+        self.shown.gpu.record_motion(frame, self.is_first())?;
         let (constants, extent) = (self.upload_frame(&mut frame.cmd)?, self.config.extent());
         let scene = FrameScene {
-            draws: self.scene.draws(),
-            culling: self.config.culls().then(|| self.scene.culling()),
-            written: &self.scene.written(),
-            wanted_mips: self.scene.wanted_mips(),
+            draws: self.shown.gpu.draws(),
+            culling: self.config.culls().then(|| self.shown.gpu.culling()),
+            written: &self.shown.gpu.written(),
+            wanted_mips: self.shown.gpu.wanted_mips(),
         };
         let work = PathWork { frame: constants, samples: count, bounces: self.config.bounces };
         let change = if self.is_first() {
             FrameChange::All
-        } else if self.camera.eye != self.before.eye || self.scene.moves() {
+        } else if self.camera.eye != self.before.eye || self.shown.gpu.moves() {
             FrameChange::Place
         } else {
             FrameChange::None
@@ -462,7 +456,7 @@ impl Viewer {
             let (sums, image) = (self.renderer.sums().0, self.target.image());
             frame.pass("picture", |cmd| self.present.record(cmd, &push, sums, image, extent))?;
         }
-        self.scene.end_frame(self.is_first());
+        self.shown.gpu.end_frame(self.is_first());
         self.frame_number = self.frame_number.wrapping_add(1);
         self.before = self.camera;
         Ok(())

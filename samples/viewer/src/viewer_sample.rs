@@ -26,10 +26,10 @@ const FRAMES_OF_ROUND: u32 = 4;
 impl Viewer {
     /// One more sample, or one more frame of the real-time method, which never ends.
     fn record_progress(&mut self, frame: &mut Frame<'_>) -> Result<(), RunError> {
-        if self.scene.stream_textures(&self.ctx)? {
+        if self.shown.gpu.stream_textures(&self.ctx)? {
             self.done = 0;
         }
-        self.scene.clear_wanted_mips(&mut frame.cmd)?;
+        self.shown.gpu.clear_wanted_mips(&mut frame.cmd)?;
         let is_whole = self.config.method == Method::PathTrace && self.done >= self.config.samples;
         let count = if is_whole { 0 } else { 1 };
         if count > 0 {
@@ -45,19 +45,19 @@ impl Viewer {
 
     /// Renders a few frames that nobody sees until the mip levels are resident that they read.
     fn load_wanted_textures(&mut self) -> lvk::Result<()> {
-        if self.scene.texture_memory().is_none() {
+        if self.shown.gpu.texture_memory().is_none() {
             return Ok(());
         }
         for round in 0..MOST_ROUNDS {
             let mut frame = Frame::free(&self.ctx)?;
-            self.scene.clear_wanted_mips(&mut frame.cmd)?;
+            self.shown.gpu.clear_wanted_mips(&mut frame.cmd)?;
             for _ in 0..FRAMES_OF_ROUND {
                 self.add_samples(&mut frame, 1, false)?;
                 frame.next_step()?;
             }
             frame.finish()?;
             self.begin();
-            if !self.scene.load_wanted_textures(&self.ctx, round == 0)? {
+            if !self.shown.gpu.load_wanted_textures(&self.ctx, round == 0)? {
                 break;
             }
         }
@@ -83,7 +83,7 @@ impl Sample for Viewer {
         self.playback.elapsed = time.seconds();
         self.pose();
         let phase = if self.playback.animation.is_some() { 0.0 } else { time.phase() };
-        self.set_camera(&around(&self.cameras[self.chosen].camera, phase));
+        self.set_camera(&around(&self.shown.cameras[self.chosen].camera, phase));
         if !self.config.is_progressive {
             self.begin();
         }
@@ -151,7 +151,7 @@ impl Sample for Viewer {
 
     /// Looks through the next camera of the model.
     fn next(&mut self) {
-        self.choose_camera((self.chosen + 1) % self.cameras.len());
+        self.choose_camera((self.chosen + 1) % self.shown.cameras.len());
     }
 
     fn orbits_at_first(&self) -> bool {
@@ -163,17 +163,17 @@ impl Sample for Viewer {
     }
 
     fn drop_file(&mut self, path: &Path) {
-        let light = (&self.environment, self.disc_radius);
+        let light = (&self.shown.environment, self.shown.disc_radius);
         self.dropped.load(&self.ctx, path, light, self.config.texture_budget);
     }
 
     #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
-        panel::show_model(ui, &self.name, self.dropped.error());
-        if let Some(chosen) = panel::choose_camera(ui, &self.cameras, self.chosen) {
+        panel::show_model(ui, &self.shown.name, self.dropped.error());
+        if let Some(chosen) = panel::choose_camera(ui, &self.shown.cameras, self.chosen) {
             self.choose_camera(chosen);
         }
-        let animations = &self.scene.rig().animations;
+        let animations = &self.shown.gpu.rig().animations;
         if let Some(animation) = panel::choose_animation(ui, animations, self.playback.animation) {
             self.play(animation, 0.0);
         }
@@ -185,10 +185,10 @@ impl Sample for Viewer {
         panel::show_error(ui, self.refused.as_deref());
         let (triangles, instances) = self.counts();
         ui.label(format!("samples: {}; {triangles} triangles, {instances} instances", self.done));
-        if self.config.culls() && self.drawn.poll(&self.ctx, self.scene.culling()).is_ok() {
+        if self.config.culls() && self.drawn.poll(&self.ctx, self.shown.gpu.culling()).is_ok() {
             panel::show_drawn(ui, self.drawn.known());
         }
-        panel::show_memory(ui, self.scene.structure_bytes);
+        panel::show_memory(ui, self.shown.gpu.structure_bytes);
         panel::show_textures(ui, self.texture_memory());
     }
 

@@ -10,6 +10,10 @@ use super::pipelines::{Layout, Pipeline, write_buffer};
 use crate::peers::glsl::COUNT_COMPUTE;
 use crate::peers::peer::{Failure, RowRun, Sample};
 
+const SHADER_ACCESS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
+    vk::AccessFlags2::SHADER_READ.as_raw() | vk::AccessFlags2::SHADER_WRITE.as_raw(),
+);
+
 /// Dispatches that add 1 to the numbers of a buffer.
 pub(super) struct Dispatches {
     device: Device,
@@ -32,6 +36,8 @@ impl Dispatches {
         let list = commands.begin(&device)?;
         // SAFETY: the buffer can be filled, and nothing uses it yet.
         unsafe { device.raw.cmd_fill_buffer(list, numbers.raw, 0, vk::WHOLE_SIZE, 0) };
+        let filled = (vk::PipelineStageFlags2::CLEAR, vk::AccessFlags2::TRANSFER_WRITE);
+        memory_barrier(&device, list, filled, (vk::PipelineStageFlags2::COMPUTE_SHADER, SHADER_ACCESS));
         commands.submit(&device)?;
         commands.wait(&device)?;
         Ok(Self { commands, pipeline, numbers, count, samples: 0, device })
@@ -46,9 +52,8 @@ impl RowRun for Dispatches {
             let list = commands.begin(device)?;
             self.pipeline.bind(device, list, vk::PipelineBindPoint::COMPUTE, &[]);
             let stage = vk::PipelineStageFlags2::COMPUTE_SHADER;
-            let read = vk::AccessFlags2::SHADER_READ | vk::AccessFlags2::SHADER_WRITE;
             for _ in 0..self.count {
-                memory_barrier(device, list, (stage, vk::AccessFlags2::SHADER_WRITE), (stage, read));
+                memory_barrier(device, list, (stage, vk::AccessFlags2::SHADER_WRITE), (stage, SHADER_ACCESS));
                 // SAFETY: pipeline and set are bound.
                 unsafe { device.raw.cmd_dispatch(list, 1, 1, 1) };
             }
