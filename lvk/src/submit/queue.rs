@@ -365,6 +365,7 @@ impl<T> Submitter<T> {
     }
 
     /// True if a submission has failed, and so none follows.
+    #[cfg(feature = "window")]
     pub(crate) fn is_broken(&self) -> bool {
         self.lock().broken.is_some()
     }
