@@ -84,7 +84,8 @@ impl Context {
     /// earlier value for it is then invalid.
     ///
     /// # Errors
-    /// [`SurfaceLost`](Error::SurfaceLost) when the window is destroyed, [`StaleHandle`](Error::StaleHandle).
+    /// [`SurfaceLost`](Error::SurfaceLost) when the window is destroyed; [`InvalidUsage`](Error::InvalidUsage) if another
+    /// swapchain or program has taken the window when the images must be created again; [`StaleHandle`](Error::StaleHandle).
     pub fn next_image(&self, swapchain: SwapchainHandle) -> Result<Option<SwapchainImage>> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
@@ -143,7 +144,7 @@ impl Context {
         shown.sync.drawn_at = submission.value;
         let answer = current.chain.present(index, mode, &shown.sync);
         // Even if the window has changed, the engine waits for the semaphore and signals the fence.
-        shown.sync.presented = !matches!(answer, Err(Failure::Other(_) | Failure::WindowInUse));
+        shown.sync.presented = matches!(answer, Ok(_) | Err(Failure::OutOfDate | Failure::SurfaceLost));
         if came_back {
             resources.set_presents_done_at(submission.value);
         }
@@ -183,7 +184,8 @@ impl Context {
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let suspended = lifecycle.suspend(&object.name, &mut live);
         self.device_state().submitter.explain_loss(suspended)?;
-        if resources.is_released_surface_kept() { Err(surface_is_kept(&object.name)) } else { Ok(()) }
+        let is_kept = resources.is_released_surface_kept();
+        if is_kept { Err(Failure::SurfaceKept.into_error(&object.name)) } else { Ok(()) }
     }
 
     /// Continues a swapchain in `window`: another one, or its own, which the window system has given back. Creates
@@ -288,13 +290,6 @@ impl Context {
     }
 }
 
-/// Returns the error for a surface that was released and is still there.
-fn surface_is_kept(swapchain: &str) -> Error {
-    let message = "views of its images, or command buffers that were not submitted, keep its surface; drop them before \
-                   its window goes or has another surface";
-    Error::usage(swapchain, message)
-}
-
 /// A locked swapchain with the context and name that its images are created with.
 struct LiveBackend<'a> {
     ctx: &'a Context,
@@ -330,7 +325,8 @@ impl PresentBackend for LiveBackend<'_> {
     }
 
     fn create_surface(&mut self) -> Result<(), Failure> {
-        self.surface().map(drop)
+        let created = self.surface().map(drop);
+        created.map_err(|failure| self.explain(failure))
     }
 
     fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
@@ -340,10 +336,7 @@ impl PresentBackend for LiveBackend<'_> {
         let made = Chain::new(&surface, &plan, old.as_deref(), self.name);
         let made = made.map_err(|failure| match failure {
             Failure::Other(error) => Failure::Other(self.ctx.device_state().submitter.explain_error(error)),
-            Failure::WindowInUse if self.resources.is_released_surface_kept() => {
-                Failure::Other(surface_is_kept(self.name))
-            }
-            of_window => of_window,
+            of_window => self.explain(of_window),
         });
         let retired = self.retire_current();
         if made.is_err()
@@ -388,6 +381,14 @@ impl PresentBackend for LiveBackend<'_> {
 }
 
 impl LiveBackend<'_> {
+    /// Returns why a window is in use, if a surface that was released still has it.
+    fn explain(&mut self, failure: Failure) -> Failure {
+        match failure {
+            Failure::WindowInUse if self.resources.is_released_surface_kept() => Failure::SurfaceKept,
+            other => other,
+        }
+    }
+
     /// Returns the surface. Creates another one if the last was lost.
     fn surface(&mut self) -> Result<Arc<Surface>, Failure> {
         if let Some(surface) = &self.resources.surface {

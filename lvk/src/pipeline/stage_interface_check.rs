@@ -5,8 +5,8 @@ use super::shader_module::ShaderModule;
 use crate::error::{Error, Result};
 use crate::shader::LocationValue;
 
-/// Fails unless each stage declares outputs for all words of the inputs of the next stage (VUID 08743), and an output at the place of an
-/// input has at least as many components of the same type (Vulkan's interface matching).
+/// Fails unless each stage declares outputs for all words of the inputs of the next stage (VUID 08743), with the same type for each
+/// component (VUID 07754).
 pub(super) fn check_interfaces(name: &str, modules: &RenderModules) -> Result<()> {
     let before = [&modules.vertex, &modules.mesh, &modules.tess_control, &modules.tess_eval];
     let stages: Vec<_> = before
@@ -25,7 +25,10 @@ fn check_pair(name: &str, from: &ShaderModule, to: &ShaderModule) -> Result<()> 
             known => format!(" ('{known}')"),
         };
         let written = match output {
-            Some(output) => format!("has {}", output.description()),
+            Some(output) => {
+                let (location, component) = (output.location, output.component);
+                format!("has {} at location {location}, component {component}", output.description())
+            }
             None => "writes nothing there".to_owned(),
         };
         let message = format!(
@@ -43,30 +46,31 @@ fn check_pair(name: &str, from: &ShaderModule, to: &ShaderModule) -> Result<()> 
     })
 }
 
-/// Returns the first input that no output matches, with the output of another type or size at its place.
+/// Returns the first input that differs from the outputs, with an output of some of its words: the one of another type, or the first
+/// where other words are of no output.
 pub(crate) fn interface_difference<'a>(
     inputs: &'a [LocationValue],
     outputs: &'a [LocationValue],
 ) -> Option<(&'a LocationValue, Option<&'a LocationValue>)> {
-    inputs.iter().find_map(|input| difference(input, outputs))
+    inputs.iter().find_map(|input| difference(input, outputs).map(|output| (input, output)))
 }
 
-/// Returns an input that no output matches, with the output of another type or size at its place.
-fn difference<'a>(
-    input: &'a LocationValue,
-    outputs: &'a [LocationValue],
-) -> Option<(&'a LocationValue, Option<&'a LocationValue>)> {
-    let mut near: Vec<_> = outputs.iter().filter(|output| output.overlaps(input)).collect();
-    near.sort_by_key(|output| output.component);
-    let Some(&first) = near.first() else { return Some((input, None)) };
-    let mut same_place = near.iter().filter(|output| output.component == input.component);
-    if let Some(other) = same_place.find(|output| !input.accepts(output)) {
-        return Some((input, Some(other)));
+/// Returns how an input differs from the outputs: the output of another type, or the first of its words where some are of no output.
+fn difference<'a>(input: &LocationValue, outputs: &'a [LocationValue]) -> Option<Option<&'a LocationValue>> {
+    let words = input.words();
+    let shares = |output: &&LocationValue| {
+        let other = output.words();
+        output.is_patch == input.is_patch && other.start < words.end && words.start < other.end
+    };
+    let mut near: Vec<_> = outputs.iter().filter(shares).collect();
+    near.sort_by_key(|output| output.words().start);
+    if let Some(other) = near.iter().find(|output| !input.has_type_of(output)) {
+        return Some(Some(other));
     }
-    let written = near.iter().fold(u64::from(input.component), |written, output| {
-        if u64::from(output.component) <= written { written.max(output.end()) } else { written }
+    let written = near.iter().map(|output| output.words()).fold(words.start, |written, output| {
+        if output.start <= written { written.max(output.end) } else { written }
     });
-    (written < input.end()).then_some((input, Some(first)))
+    (written < words.end).then(|| near.first().copied())
 }
 
 #[cfg(test)]
@@ -105,13 +109,36 @@ mod tests {
     }
 
     #[test]
-    fn an_output_at_the_place_of_an_input_has_its_type_and_size() {
+    fn each_component_of_an_input_has_the_type_of_its_output() {
         let inputs = [floats(2, 0, 3)];
         assert_eq!(interface_difference(&[floats(2, 0, 2)], &inputs), None);
-        let integers = LocationValue { numbers: NumericFormat::Sint, ..floats(2, 0, 3) };
-        for output in [floats(2, 0, 2), integers] {
+        let integers =
+            |component, count| LocationValue { numbers: NumericFormat::Sint, ..floats(2, component, count) };
+        for output in [floats(2, 0, 2), integers(0, 3)] {
             let outputs = [output];
             assert_eq!(interface_difference(&inputs, &outputs), Some((&inputs[0], Some(&outputs[0]))));
         }
+        // Integers behind floats, and before them.
+        for outputs in [[floats(2, 0, 2), integers(2, 1)], [floats(2, 1, 2), integers(0, 1)]] {
+            assert_eq!(interface_difference(&inputs, &outputs), Some((&inputs[0], Some(&outputs[1]))));
+        }
+        // An output of whole patches is another.
+        let of_patch = [LocationValue { is_patch: true, ..floats(2, 0, 4) }];
+        assert_eq!(interface_difference(&inputs, &of_patch), Some((&inputs[0], None)));
+    }
+
+    #[test]
+    fn outputs_share_inputs_and_inputs_share_outputs() {
+        let of = |inputs: &[LocationValue], outputs: &[LocationValue]| {
+            interface_difference(inputs, outputs).is_none()
+        };
+        let doubles =
+            |location, component, count| LocationValue { bytes: 8, ..floats(location, component, count) };
+        assert!(of(&[floats(1, 0, 4)], &[floats(1, 2, 2), floats(1, 0, 2)]));
+        // Four 64-bit numbers take two locations.
+        assert!(of(&[doubles(0, 0, 2), doubles(1, 0, 2)], &[doubles(0, 0, 4)]));
+        assert!(of(&[doubles(0, 0, 4)], &[doubles(0, 0, 2), doubles(1, 0, 2)]));
+        assert!(!of(&[doubles(0, 0, 4)], &[doubles(0, 0, 3)]));
+        assert!(!of(&[floats(1, 0, 2)], &[doubles(0, 0, 4)]));
     }
 }

@@ -82,6 +82,8 @@ pub(crate) enum Failure {
     SurfaceLost,
     /// Another swapchain, or another program, has the window.
     WindowInUse,
+    /// The window still has the surface of this swapchain that was released, because something keeps its images.
+    SurfaceKept,
     /// An error that a new swapchain does not resolve.
     Other(Error),
 }
@@ -109,6 +111,11 @@ impl Failure {
             Self::WindowInUse => {
                 let message =
                     "its window has another swapchain, or another program draws to it; destroy that first";
+                Error::usage(name, message)
+            }
+            Self::SurfaceKept => {
+                let message = "views of its images, or command buffers that were not submitted, keep its surface; \
+                               drop them before its window goes or has another surface";
                 Error::usage(name, message)
             }
             Self::Other(error) => error,

@@ -214,7 +214,7 @@ impl SwapchainState {
         self.acquired = None;
         match (self.status, answer) {
             (SwapchainStatus::Suspended | SwapchainStatus::SurfaceReleased, _) => {}
-            (_, Err(failure @ (Failure::Other(_) | Failure::WindowInUse))) => {
+            (_, Err(failure @ (Failure::Other(_) | Failure::WindowInUse | Failure::SurfaceKept))) => {
                 self.status = SwapchainStatus::OutOfDate;
                 return Err(failure.into_error(name));
             }

@@ -18,18 +18,21 @@ pub enum FaultError {
     SurfaceLost,
     /// `VK_ERROR_OUT_OF_DATE_KHR`.
     OutOfDate,
+    /// `VK_ERROR_NATIVE_WINDOW_IN_USE_KHR`.
+    WindowInUse,
     /// `VK_SUCCESS` with the address of a failed `mmap`, -1, as lavapipe answers `vkMapMemory` where address space lacks.
     NoAddress,
 }
 
 impl FaultError {
     /// Every error.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::HostMemory,
         Self::DeviceMemory,
         Self::DeviceLost,
         Self::SurfaceLost,
         Self::OutOfDate,
+        Self::WindowInUse,
         Self::NoAddress,
     ];
 
@@ -42,6 +45,7 @@ impl FaultError {
             Self::DeviceLost => "device-lost",
             Self::SurfaceLost => "surface-lost",
             Self::OutOfDate => "out-of-date",
+            Self::WindowInUse => "window-in-use",
             Self::NoAddress => "no-address",
         }
     }
@@ -54,6 +58,7 @@ impl FaultError {
             Self::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
             Self::SurfaceLost => vk::Result::ERROR_SURFACE_LOST_KHR,
             Self::OutOfDate => vk::Result::ERROR_OUT_OF_DATE_KHR,
+            Self::WindowInUse => vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR,
             Self::NoAddress => vk::Result::SUCCESS,
         }
     }
@@ -72,6 +77,9 @@ impl FaultError {
             Self::DeviceLost => ["device was lost", "error_device_lost", "device has been lost"],
             Self::SurfaceLost => ["window is gone", "error_surface_lost", "surface is no longer available"],
             Self::OutOfDate => ["out of date", "error_out_of_date", "surface has changed"],
+            Self::WindowInUse => {
+                ["window has another swapchain", "error_native_window_in_use", "window is already in use"]
+            }
         }
     }
 

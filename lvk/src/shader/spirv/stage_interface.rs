@@ -1,5 +1,6 @@
 //! Inputs and outputs that shader stages pass to each other by location.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use ::spirv::{Decoration, StorageClass};
@@ -62,23 +63,16 @@ impl LocationValue {
         format!("{} {}-bit {numbers}", self.count, u64::from(self.bytes) * 8)
     }
 
-    /// True if a stage that takes `self` can read it from `output`, which has the same location and component.
-    pub(crate) fn accepts(&self, output: &Self) -> bool {
+    /// True if components of the values have the same type. The sign of integers does not matter.
+    pub(crate) fn has_type_of(&self, other: &Self) -> bool {
         let is_float = |value: &Self| value.numbers == NumericFormat::Float;
-        is_float(self) == is_float(output) && self.bytes == output.bytes && self.count <= output.count
+        is_float(self) == is_float(other) && self.bytes == other.bytes
     }
 
-    /// Returns the first word behind the value.
-    pub(crate) fn end(&self) -> u64 {
-        u64::from(self.component) + u64::from(self.count) * u64::from(self.bytes.div_ceil(4))
-    }
-
-    /// True if the values share words of a location.
-    pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        self.is_patch == other.is_patch
-            && self.location == other.location
-            && u64::from(self.component) < other.end()
-            && u64::from(other.component) < self.end()
+    /// Returns the 32-bit words of the value: each location has four, and a component takes whole words.
+    pub(crate) fn words(&self) -> Range<u64> {
+        let start = u64::from(self.location) * 4 + u64::from(self.component);
+        start..start + u64::from(self.count) * u64::from(self.bytes.div_ceil(4))
     }
 }
 
@@ -292,15 +286,16 @@ mod tests {
             is_patch: false,
             name: "".into(),
         };
-        assert!(value.overlaps(&value));
+        let words = value.words();
+        assert_eq!(words.end - words.start, u64::from(u32::MAX) << 27);
         assert_eq!(value.description(), "4294967295 4294967296-bit integers");
     }
 
     #[test]
-    fn narrower_inputs_of_the_same_kind_are_accepted() {
+    fn values_have_types_and_words() {
         let value = |count, numbers, bytes| LocationValue {
-            location: 0,
-            component: 0,
+            location: 2,
+            component: 1,
             count,
             bytes,
             numbers,
@@ -308,11 +303,12 @@ mod tests {
             name: "".into(),
         };
         let (float, sint, uint) = (NumericFormat::Float, NumericFormat::Sint, NumericFormat::Uint);
-        assert!(value(2, float, 4).accepts(&value(3, float, 4)));
-        assert!(value(1, sint, 4).accepts(&value(1, uint, 4)));
-        assert!(!value(3, float, 4).accepts(&value(2, float, 4)));
-        assert!(!value(1, float, 4).accepts(&value(1, uint, 4)));
-        assert!(!value(1, float, 2).accepts(&value(1, float, 4)));
+        assert!(value(1, sint, 4).has_type_of(&value(3, uint, 4)));
+        assert!(!value(1, float, 4).has_type_of(&value(1, uint, 4)));
+        assert!(!value(1, float, 2).has_type_of(&value(1, float, 4)));
+        assert_eq!(value(3, float, 4).words(), 9..12);
+        assert_eq!(value(3, float, 2).words(), 9..12);
+        assert_eq!(value(3, float, 8).words(), 9..15);
         assert_eq!(value(3, float, 4).description(), "3 32-bit floats");
     }
 }

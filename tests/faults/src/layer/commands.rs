@@ -12,6 +12,8 @@ pub(super) const SURFACE: u8 = 2;
 pub(super) const DATED: u8 = 4;
 /// The command writes the address of mapped memory to its last argument.
 pub(super) const MAPS: u8 = 8;
+/// The command may find the window in use. Vulkan names this answer for surfaces of Android alone; those of X stand for them.
+pub(super) const IN_USE: u8 = 16;
 
 /// Objects that a command creates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +32,7 @@ pub(super) struct Command {
     pub(super) name: &'static str,
     /// Another name of the same command.
     pub(super) alias: Option<&'static str>,
-    /// The bits [`LOST`], [`SURFACE`], [`DATED`] and [`MAPS`].
+    /// The bits [`LOST`], [`SURFACE`], [`DATED`], [`MAPS`] and [`IN_USE`].
     pub(super) answers: u8,
     /// Objects that it creates.
     pub(super) creates: Creates,
@@ -179,13 +181,13 @@ commands! {
         PFN_vkGetPhysicalDeviceSurfaceCapabilitiesKHR three [SURFACE];
         PFN_vkGetPhysicalDeviceSurfaceFormatsKHR four [SURFACE];
         PFN_vkGetPhysicalDeviceSurfacePresentModesKHR four [SURFACE];
-        PFN_vkCreateSwapchainKHR four [LOST | SURFACE] makes "VkSwapchainKHR";
+        PFN_vkCreateSwapchainKHR four [LOST | SURFACE | IN_USE] makes "VkSwapchainKHR";
         PFN_vkGetSwapchainImagesKHR four;
         PFN_vkAcquireNextImageKHR six [LOST | SURFACE | DATED];
         PFN_vkQueuePresentKHR two [LOST | SURFACE | DATED];
         PFN_vkAcquireNextImage2KHR three [LOST | SURFACE | DATED];
-        PFN_vkCreateXlibSurfaceKHR four makes "VkSurfaceKHR";
-        PFN_vkCreateXcbSurfaceKHR four makes "VkSurfaceKHR";
+        PFN_vkCreateXlibSurfaceKHR four [IN_USE] makes "VkSurfaceKHR";
+        PFN_vkCreateXcbSurfaceKHR four [IN_USE] makes "VkSurfaceKHR";
         PFN_vkGetPhysicalDeviceImageFormatProperties2 three alias "vkGetPhysicalDeviceImageFormatProperties2KHR";
         PFN_vkGetMemoryFdKHR three;
         PFN_vkGetMemoryFdPropertiesKHR four;

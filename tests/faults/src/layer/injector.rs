@@ -13,7 +13,7 @@ use ash::vk::Handle;
 use lvk::readable_bytes;
 
 use super::command_buffers::CommandBuffers;
-use super::commands::{Creates, DATED, LOST, MAPS, SURFACE};
+use super::commands::{Creates, DATED, IN_USE, LOST, MAPS, SURFACE};
 use super::dispatch::{COMMANDS, table_of};
 use crate::call_log::{self, NamedObject};
 use crate::fault::{Fault, FaultError};
@@ -321,6 +321,7 @@ fn errors_of(answers: u8) -> Vec<FaultError> {
         (LOST, FaultError::DeviceLost),
         (SURFACE, FaultError::SurfaceLost),
         (DATED, FaultError::OutOfDate),
+        (IN_USE, FaultError::WindowInUse),
         (MAPS, FaultError::NoAddress),
     ] {
         if answers & bit != 0 {

@@ -9,8 +9,8 @@ use crate::fault::{Fault, FaultError, Span};
 
 /// Judges the line of an error: it must name a command that has failed, behind it the object of that command, and the cause.
 ///
-/// Three other forms count: the swapchain whose window is gone, for a lost surface; the swapchain that stays out of date; and what
-/// needs ray tracing on a device that was created without. Every command concerns an object, those before the device the loader,
+/// Four other forms count: the swapchain whose window is gone, for a lost surface; the swapchain whose window has another; the
+/// swapchain that stays out of date; and what needs ray tracing on a device that was created without. Every command concerns an object, those before the device the loader,
 /// the instance or the window.
 pub(super) fn judge_error(
     error: &str,
@@ -19,9 +19,12 @@ pub(super) fn judge_error(
     clean: &RunOutcome,
 ) -> Option<Flaw> {
     let objects = KnownObjects::of(found, clean);
-    if fault.error == FaultError::SurfaceLost
-        && let Some((before, _)) = error.split_once(WINDOW_IS_GONE)
-    {
+    let of_window: &[&str] = match fault.error {
+        FaultError::SurfaceLost => &[WINDOW_IS_GONE],
+        FaultError::WindowInUse => &[WINDOW_IS_IN_USE, SURFACE_IS_KEPT],
+        _ => &[],
+    };
+    if let Some((before, _)) = of_window.iter().find_map(|end| error.split_once(end)) {
         return (!objects.end_with_swapchain(before)).then(|| Flaw::UnnamedObject(error.to_owned()));
     }
     if fault.error == FaultError::OutOfDate
@@ -87,6 +90,12 @@ const WITHOUT_RAY_TRACING: &str = "vkCreateDevice with ray tracing returned";
 
 /// The end of an error about a lost surface, after the quoted name of the swapchain.
 const WINDOW_IS_GONE: &str = "': its window is gone";
+
+/// The end of an error about a window that another swapchain has, after the quoted name of the swapchain.
+const WINDOW_IS_IN_USE: &str = "': its window has another swapchain";
+
+/// The end of an error about a window whose former surface something keeps, after the quoted name of the swapchain.
+const SURFACE_IS_KEPT: &str = "': views of its images";
 
 /// The end of a scenario's error about a swapchain without an image, after its quoted name.
 const STAYS_OUT_OF_DATE: &str = "' stays out of date";
@@ -193,6 +202,16 @@ mod tests {
         ] {
             let flaw = Some(Flaw::UnnamedObject(unnamed.to_owned()));
             assert_eq!(judge(FaultError::SurfaceLost, unnamed), flaw, "{unnamed}");
+        }
+        let in_use = [
+            "error: swapchain 'main': its window has another swapchain, or another program draws to it",
+            "error: 'main': views of its images, or command buffers that were not submitted, keep its surface",
+        ];
+        for named in in_use {
+            assert_eq!(judge(FaultError::WindowInUse, named), None, "{named}");
+            let unnamed = named.replace("main", "other");
+            let flaw = Some(Flaw::UnnamedObject(unnamed.clone()));
+            assert_eq!(judge(FaultError::WindowInUse, &unnamed), flaw, "{unnamed}");
         }
         let attached = "error: lvkMapMemory for 'rain'";
         assert_eq!(judge(FaultError::HostMemory, attached), Some(Flaw::UnnamedCommand(attached.to_owned())));

@@ -112,6 +112,7 @@ mod tests {
             FaultError::DeviceLost => "device lost",
             FaultError::SurfaceLost => "surface lost",
             FaultError::OutOfDate => "out of date",
+            FaultError::WindowInUse => "window in use",
             FaultError::NoAddress => "no address",
         }
     }

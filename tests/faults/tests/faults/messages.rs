@@ -71,6 +71,23 @@ fn semaphores_of_windows_outlive_their_work() {
     }
 }
 
+/// A window that is in use is told, and the surface that was released where that has it.
+#[test]
+fn a_window_in_use_tells_what_has_it() {
+    let Some((_connection, _display, program)) = in_window(validated("kept_surface")) else { return };
+    let program = clean(program);
+    assert_validated(&program);
+    for command in ["vkCreateXcbSurfaceKHR", "vkCreateSwapchainKHR"] {
+        let told = |number: u32| {
+            let fault = format!("{command} {number} window-in-use once");
+            error_line(&assert_reached(&program, &fault)).to_owned()
+        };
+        let (first, kept) = (told(1), told(2));
+        assert!(first.contains("swapchain of the scenario': its window has another swapchain"), "{first}");
+        assert!(kept.contains("swapchain of the scenario': views of its images"), "{kept}");
+    }
+}
+
 /// Staging memory is named with the object that it fills.
 #[test]
 fn an_error_of_staging_memory_names_what_it_fills() {

@@ -61,7 +61,7 @@ fn some_calls_fail_while_caches_are_written() {
 #[test]
 fn some_calls_of_a_window_fail() {
     let Some((_connection, _display, program)) = in_window(program("window")) else { return };
-    let errors = vec![FaultError::SurfaceLost, FaultError::OutOfDate];
+    let errors = vec![FaultError::SurfaceLost, FaultError::OutOfDate, FaultError::WindowInUse];
     assert_no_flaws("window", &program, &SweepPlan { errors, stays_out_of_date: true, ..some(12) }, SAMPLE);
 }
 

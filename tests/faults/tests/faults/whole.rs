@@ -248,6 +248,7 @@ macro_rules! window_sweeps {
 window_sweeps! {
     whole_window: program("window"), true;
     whole_another_window: program("another_window"), true;
+    whole_kept_surface: program("kept_surface"), true;
     whole_window_of_hybrid: sample_in_window(program(WINDOWED[0])), false;
     whole_window_of_hello_triangle: sample_in_window(program(WINDOWED[1])), false;
     whole_window_of_viewer: sample_in_window(program(WINDOWED[2])), false;

@@ -70,6 +70,27 @@ pub(crate) fn another_window() -> Result<Vec<u8>, Failure> {
     Ok([first, second].concat())
 }
 
+/// Suspends a swapchain while a command buffer keeps its surface, and goes on in the same window. Returns the colours that the window
+/// shows before and after.
+pub(crate) fn kept_surface() -> Result<Vec<u8>, Failure> {
+    let (window, ctx, swapchain) = start()?;
+    let first = show(&ctx, *swapchain, &window, RED)?;
+    let Some(image) = ctx.next_image(*swapchain)? else { return Err("the swapchain has no image".into()) };
+    let mut kept = ctx.acquire_command_buffer()?;
+    let target = [ColorAttachment::clear(image.texture(), RED)];
+    drop(kept.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
+    match ctx.suspend_swapchain(*swapchain) {
+        Err(lvk::Error::InvalidUsage { .. }) => {}
+        Err(error) => return Err(error.into()),
+        Ok(()) => return Err("the suspension does not tell of the surface".into()),
+    }
+    ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48])?;
+    drop(kept);
+    let second = show(&ctx, *swapchain, &window, BLUE)?;
+    ctx.wait_idle()?;
+    Ok([first, second].concat())
+}
+
 /// Presents frames until the window shows the colour.
 fn show(
     ctx: &Context,
