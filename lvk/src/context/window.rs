@@ -21,8 +21,9 @@ use crate::resource::image_usage::{raw_usage, usage_from_features};
 use crate::resource::texture_desc::TextureDesc;
 use crate::submit::{Submission, SubmitHandle};
 use crate::swapchain::chain::{Chain, ChainPlan, PresentSync};
-use crate::swapchain::choose::{self, Failure};
+use crate::swapchain::choose;
 use crate::swapchain::desc::{PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo};
+use crate::swapchain::failure::{Failure, check_surface_is_gone};
 use crate::swapchain::lifecycle::{Acquired, PresentBackend};
 use crate::swapchain::state::{
     ChainImage, Current, Swapchain, SwapchainConfig, SwapchainInner, SwapchainResources,
@@ -63,7 +64,8 @@ impl Context {
             usage: desc.usage,
             image_count: desc.image_count,
         };
-        let surface = Surface::new(&shared.gpu, window, name)?;
+        let surface = Surface::new(&shared.gpu, window, name);
+        let surface = surface.map_err(|error| Failure::from(error).into_error(name))?;
         let handle = shared.store.swapchains.insert(Swapchain::new(name, surface, wishes, &shared.gpu));
         let holder = Holder::new(self, handle, 0);
         let swapchain = shared.store.swapchains.get(handle)?;
@@ -134,7 +136,7 @@ impl Context {
         let shown = current.images.get_mut(index as usize).ok_or_else(outdated)?;
         cmd.release_image(&shown.object)?;
         shown.sync.reset()?;
-        let came_back = std::mem::replace(&mut shown.sync.presented, false);
+        shown.sync.came_back |= std::mem::replace(&mut shown.sync.presented, false);
         let drawn = vk::SemaphoreSubmitInfo::default()
             .semaphore(shown.sync.drawn)
             .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS);
@@ -144,8 +146,8 @@ impl Context {
         shown.sync.drawn_at = submission.value;
         let answer = current.chain.present(index, mode, &shown.sync);
         // Even if the window has changed, the engine waits for the semaphore and signals the fence.
-        shown.sync.presented = matches!(answer, Ok(_) | Err(Failure::OutOfDate | Failure::SurfaceLost));
-        if came_back {
+        shown.sync.presented = matches!(answer, Ok(_) | Err(Failure::OutOfDate | Failure::SurfaceLost(_)));
+        if std::mem::take(&mut shown.sync.came_back) {
             resources.set_presents_done_at(submission.value);
         }
         if let Some(semaphore) = resources.signalled.take() {
@@ -184,8 +186,7 @@ impl Context {
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let suspended = lifecycle.suspend(&object.name, &mut live);
         self.device_state().submitter.explain_loss(suspended)?;
-        let is_kept = resources.is_released_surface_kept();
-        if is_kept { Err(Failure::SurfaceKept.into_error(&object.name)) } else { Ok(()) }
+        check_surface_is_gone(&object.name, resources.is_released_surface_kept())
     }
 
     /// Continues a swapchain in `window`: another one, or its own, which the window system has given back. Creates
@@ -384,7 +385,7 @@ impl LiveBackend<'_> {
     /// Returns why a window is in use, if a surface that was released still has it.
     fn explain(&mut self, failure: Failure) -> Failure {
         match failure {
-            Failure::WindowInUse if self.resources.is_released_surface_kept() => Failure::SurfaceKept,
+            Failure::WindowInUse(error) if self.resources.is_window_kept() => Failure::FormerSurface(error),
             other => other,
         }
     }

@@ -126,16 +126,15 @@ pub enum Error {
     /// The window of a swapchain is gone: its surface is lost (`VK_ERROR_SURFACE_LOST_KHR`), and another surface too, or the window takes
     /// no other. Another call for an image tries again.
     #[error(
-        "swapchain '{}': its window is gone{}; suspend the swapchain, and resume it in another window, or destroy it before its window",
-        readable_name(swapchain),
-        source.as_ref().map_or_else(String::new, |refusal| format!(", or takes no other surface ({refusal})"))
+        "swapchain '{}': its window is gone ({source}); suspend the swapchain, and resume it in another window, or destroy it before its window",
+        readable_name(swapchain)
     )]
     SurfaceLost {
         /// Debug name of the swapchain.
         swapchain: String,
-        /// The error of the other surface, if it could not be created. Drivers answer with a shortage of memory for a window that is gone
-        /// too (Mesa 25.0 for one that is closed), so this error does not tell a shortage from that.
-        source: Option<Box<Error>>,
+        /// The error of the call that found the surface lost, or of the creation of another surface. Drivers answer with a shortage of memory
+        /// for a window that is gone too (Mesa 25.0 for one that is closed), so this error does not tell a shortage from that.
+        source: Box<Error>,
     },
     /// The queue of a command buffer does not support a command.
     #[error("{command} cannot be recorded for the {} queue; acquire a command buffer on {remedy}", queue.label())]
@@ -492,7 +491,7 @@ mod tests {
             },
             Error::StaleHandle { kind: "buffer", name: Some(text()) },
             Error::usage(text(), text()),
-            Error::SurfaceLost { swapchain: text(), source: None },
+            Error::SurfaceLost { swapchain: text(), source: Box::new(Error::usage("window", text())) },
             Error::PushConstants { pipeline: text(), expected: 1, offset: 0, size: 2 },
             Error::LayoutMismatch {
                 pipeline: text(),
@@ -585,12 +584,9 @@ mod tests {
             let told = text(result);
             assert!(told.starts_with(&format!("{start} in vkEndCommandBuffer for 'shadows'")), "{told}");
         }
-        let gone = |source| Error::SurfaceLost { swapchain: "main".to_owned(), source }.to_string();
-        let told = gone(None);
-        assert!(told.starts_with("swapchain 'main': its window is gone; suspend"), "{told}");
         let refusal = Error::vulkan("vkCreateXcbSurfaceKHR", "main")(vk::Result::ERROR_OUT_OF_HOST_MEMORY);
-        let told = gone(Some(Box::new(refusal)));
-        let start = "swapchain 'main': its window is gone, or takes no other surface (out of host memory in vkCreateXcb";
+        let told = Error::SurfaceLost { swapchain: "main".to_owned(), source: Box::new(refusal) }.to_string();
+        let start = "swapchain 'main': its window is gone (out of host memory in vkCreateXcb";
         assert!(told.starts_with(start), "{told}");
     }
 

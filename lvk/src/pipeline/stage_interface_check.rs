@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::shader::LocationValue;
 
 /// Fails unless each stage declares outputs for all words of the inputs of the next stage (VUID 08743), with the same type for each
-/// component (VUID 07754).
+/// component (VUID 07754), and per vertex or per primitive as they are.
 pub(super) fn check_interfaces(name: &str, modules: &RenderModules) -> Result<()> {
     let before = [&modules.vertex, &modules.mesh, &modules.tess_control, &modules.tess_eval];
     let stages: Vec<_> = before
@@ -64,7 +64,7 @@ fn difference<'a>(input: &LocationValue, outputs: &'a [LocationValue]) -> Option
     };
     let mut near: Vec<_> = outputs.iter().filter(shares).collect();
     near.sort_by_key(|output| output.words().start);
-    if let Some(other) = near.iter().find(|output| !input.has_type_of(output)) {
+    if let Some(other) = near.iter().find(|output| !input.is_like(output)) {
         return Some(Some(other));
     }
     let written = near.iter().map(|output| output.words()).fold(words.start, |written, output| {
@@ -87,6 +87,7 @@ mod tests {
             bytes: 4,
             numbers: NumericFormat::Float,
             is_patch: false,
+            is_per_primitive: false,
             name: "value".into(),
         }
     }
@@ -122,6 +123,10 @@ mod tests {
         for outputs in [[floats(2, 0, 2), integers(2, 1)], [floats(2, 1, 2), integers(0, 1)]] {
             assert_eq!(interface_difference(&inputs, &outputs), Some((&inputs[0], Some(&outputs[1]))));
         }
+        // Values of primitives are none of vertices.
+        let of_primitive = [LocationValue { is_per_primitive: true, ..floats(2, 0, 4) }];
+        assert_eq!(interface_difference(&inputs, &of_primitive), Some((&inputs[0], Some(&of_primitive[0]))));
+        assert_eq!(interface_difference(&of_primitive, &of_primitive), None);
         // An output of whole patches is another.
         let of_patch = [LocationValue { is_patch: true, ..floats(2, 0, 4) }];
         assert_eq!(interface_difference(&inputs, &of_patch), Some((&inputs[0], None)));

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::choose::Failure;
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
+use super::failure::Failure;
 use super::lifecycle::Acquired;
 use super::present_wait::PRESENT_TIMEOUT_NS;
 use super::surface::Surface;
@@ -149,6 +149,8 @@ pub(crate) struct PresentSync {
     present_fence: Option<vk::Fence>,
     /// True if the image was presented with these objects since its last acquisition.
     pub(crate) presented: bool,
+    /// True if the image was acquired again, and no submission has waited for it since.
+    pub(crate) came_back: bool,
     /// Timeline value of the last submission that signals `drawn`.
     pub(crate) drawn_at: u64,
     /// True if the presentation engine never finishes the image's presents, as far as the library can tell. For tests.
@@ -166,6 +168,7 @@ impl PresentSync {
             drawn,
             present_fence: None,
             presented: false,
+            came_back: false,
             drawn_at: 0,
             #[cfg(any(test, feature = "test-hooks"))]
             stalls: false,

@@ -1,9 +1,8 @@
-//! Choice of swapchain parameters, and interpretation of results of the presentation engine. Needs no device.
+//! Choice of swapchain parameters. Needs no device.
 
 use ash::vk;
 
 use super::desc::{ColorSpace, PresentMode};
-use crate::error::Error;
 use crate::format::Format;
 
 /// Limits of a surface for its images.
@@ -71,62 +70,6 @@ pub(crate) fn choose_composite_alpha(offered: vk::CompositeAlphaFlagsKHR) -> vk:
     }
     let raw = offered.as_raw();
     vk::CompositeAlphaFlagsKHR::from_raw(raw & raw.wrapping_neg())
-}
-
-/// Failure of a call to the presentation engine.
-#[derive(Debug, Clone)]
-pub(crate) enum Failure {
-    /// The swapchain no longer matches its window.
-    OutOfDate,
-    /// The surface is lost, though the window may still exist.
-    SurfaceLost,
-    /// Another swapchain, or another program, has the window.
-    WindowInUse,
-    /// The window still has the surface of this swapchain that was released, because something keeps its images.
-    SurfaceKept,
-    /// An error that a new swapchain does not resolve.
-    Other(Error),
-}
-
-impl Failure {
-    /// Returns the failure for a result of `call` about the swapchain `name`.
-    pub(crate) fn from_result(call: &'static str, name: &str) -> impl FnOnce(vk::Result) -> Self {
-        move |result| match result {
-            vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
-                Self::OutOfDate
-            }
-            vk::Result::ERROR_SURFACE_LOST_KHR => Self::SurfaceLost,
-            vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR => Self::WindowInUse,
-            result => Self::Other(Error::vulkan(call, name)(result)),
-        }
-    }
-}
-
-impl Failure {
-    /// Returns the error for a caller whose request cannot be repeated.
-    pub(crate) fn into_error(self, name: &str) -> Error {
-        match self {
-            Self::OutOfDate => Error::usage(name, "its window is changing; try again"),
-            Self::SurfaceLost => Error::SurfaceLost { swapchain: name.to_owned(), source: None },
-            Self::WindowInUse => {
-                let message =
-                    "its window has another swapchain, or another program draws to it; destroy that first";
-                Error::usage(name, message)
-            }
-            Self::SurfaceKept => {
-                let message = "views of its images, or command buffers that were not submitted, keep its surface; \
-                               drop them before its window goes or has another surface";
-                Error::usage(name, message)
-            }
-            Self::Other(error) => error,
-        }
-    }
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::Other(error)
-    }
 }
 
 #[cfg(test)]
@@ -236,21 +179,5 @@ mod tests {
         use vk::CompositeAlphaFlagsKHR as Alpha;
         assert_eq!(choose_composite_alpha(Alpha::INHERIT | Alpha::OPAQUE), Alpha::OPAQUE);
         assert_eq!(choose_composite_alpha(Alpha::INHERIT | Alpha::PRE_MULTIPLIED), Alpha::PRE_MULTIPLIED);
-    }
-
-    #[test]
-    fn answers_mean_another_swapchain_another_surface_or_an_error() {
-        let of = |result| Failure::from_result("vkAcquireNextImageKHR", "main window")(result);
-        assert!(matches!(of(vk::Result::ERROR_OUT_OF_DATE_KHR), Failure::OutOfDate));
-        assert!(matches!(of(vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT), Failure::OutOfDate));
-        assert!(matches!(of(vk::Result::ERROR_SURFACE_LOST_KHR), Failure::SurfaceLost));
-        let in_use = of(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR).into_error("main window").to_string();
-        assert!(in_use.contains("main window") && in_use.contains("another swapchain"), "{in_use}");
-        let text = |result| match of(result) {
-            Failure::Other(error) => error.to_string(),
-            other => panic!("{other:?}"),
-        };
-        assert!(text(vk::Result::ERROR_DEVICE_LOST).contains("vkAcquireNextImageKHR"));
-        assert!(text(vk::Result::ERROR_OUT_OF_HOST_MEMORY).contains("host memory"));
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod chain;
 pub(crate) mod choose;
 pub(crate) mod desc;
+pub(crate) mod failure;
 pub(crate) mod lifecycle;
 mod present_wait;
 pub(crate) mod state;

@@ -13,7 +13,7 @@ use crate::barrier::ResourceId;
 use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::start::window::WindowHandles;
+use crate::gpu::start::window::{WindowHandles, is_same_window};
 use crate::handle::TextureHandle;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Texture;
@@ -235,6 +235,12 @@ impl SwapchainResources {
     pub(crate) fn is_released_surface_kept(&mut self) -> bool {
         self.released.retain(|surface| surface.strong_count() > 0);
         !self.released.is_empty()
+    }
+
+    /// True if command buffers or views keep a surface of the present window that was released.
+    pub(crate) fn is_window_kept(&self) -> bool {
+        let surfaces = self.released.iter().filter_map(Weak::upgrade);
+        surfaces.into_iter().any(|surface| is_same_window(surface.window.as_ref(), self.window.as_ref()))
     }
 
     /// Destroys all replaced swapchains, and the surface if nothing else keeps it. Their presents are finished or

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::choose::{Failure, SurfaceLimits};
+use super::choose::SurfaceLimits;
 use super::desc::PresentMode;
+use super::failure::Failure;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::start::surface::{WindowFunctions, create_surface};

@@ -2,15 +2,18 @@
 
 #![allow(missing_docs, reason = "only tests see it")]
 
+use ash::vk;
+
 use crate::context::Context;
 use crate::error::Result;
 use crate::handle::SwapchainHandle;
-use crate::swapchain::choose::Failure;
+use crate::swapchain::failure::Failure;
 
 /// Makes the library believe that the presentation engine has lost the surface of a window.
 pub fn lose_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<()> {
     let swapchain = ctx.device_state().store.swapchains.get(swapchain)?;
-    swapchain.lock().lifecycle.record_present("window", Err(Failure::SurfaceLost))
+    let lost = Failure::from_result("vkQueuePresentKHR", "window")(vk::Result::ERROR_SURFACE_LOST_KHR);
+    swapchain.lock().lifecycle.record_present("window", Err(lost))
 }
 
 /// Makes the library believe that the presentation engine never finishes one of the images that were presented last.

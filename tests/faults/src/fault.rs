@@ -78,7 +78,7 @@ impl FaultError {
             Self::SurfaceLost => ["window is gone", "error_surface_lost", "surface is no longer available"],
             Self::OutOfDate => ["out of date", "error_out_of_date", "surface has changed"],
             Self::WindowInUse => {
-                ["window has another swapchain", "error_native_window_in_use", "window is already in use"]
+                ["error_native_window_in_use", "window is already in use", "window is in use"]
             }
         }
     }

@@ -106,6 +106,11 @@ pub(super) fn raw_window(window: &dyn WindowHandles) -> Result<RawWindowHandle> 
     window.window_handle().map(|window| window.as_raw()).map_err(no_handle)
 }
 
+/// True if both are the same window of the window system.
+pub(crate) fn is_same_window(one: &dyn WindowHandles, other: &dyn WindowHandles) -> bool {
+    matches!((raw_window(one), raw_window(other)), (Ok(one), Ok(other)) if one == other)
+}
+
 fn no_handle(error: raw_window_handle::HandleError) -> Error {
     Error::usage("window", format!("the window has no handle: {error}"))
 }

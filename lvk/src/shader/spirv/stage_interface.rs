@@ -27,6 +27,8 @@ pub(crate) struct LocationValue {
     pub(crate) numbers: NumericFormat,
     /// True for a value of a whole patch.
     pub(crate) is_patch: bool,
+    /// True for a value of a primitive, which no vertex has.
+    pub(crate) is_per_primitive: bool,
     /// Name of the variable; empty without debug names.
     pub(crate) name: Arc<str>,
 }
@@ -60,13 +62,17 @@ impl LocationValue {
             NumericFormat::Float => "floats",
             NumericFormat::Uint | NumericFormat::Sint => "integers",
         };
-        format!("{} {}-bit {numbers}", self.count, u64::from(self.bytes) * 8)
+        let of = if self.is_per_primitive { " of each primitive" } else { "" };
+        format!("{} {}-bit {numbers}{of}", self.count, u64::from(self.bytes) * 8)
     }
 
-    /// True if components of the values have the same type. The sign of integers does not matter.
-    pub(crate) fn has_type_of(&self, other: &Self) -> bool {
+    /// True if a component of an input may be one of the output: their types are the same, and both are values of vertices or of
+    /// primitives. The sign of integers does not matter.
+    pub(crate) fn is_like(&self, output: &Self) -> bool {
         let is_float = |value: &Self| value.numbers == NumericFormat::Float;
-        is_float(self) == is_float(other) && self.bytes == other.bytes
+        is_float(self) == is_float(output)
+            && self.bytes == output.bytes
+            && self.is_per_primitive == output.is_per_primitive
     }
 
     /// Returns the 32-bit words of the value: each location has four, and a component takes whole words.
@@ -100,13 +106,14 @@ fn collect(
         return;
     }
     let is_patch = decoration(Decoration::Patch).is_some();
+    let is_per_primitive = decoration(Decoration::PerPrimitiveEXT).is_some();
     let ty = match module.types.get(target) {
         Some(Type::Array { element, .. }) if is_array && !is_patch => element,
         _ => target,
     };
     let name = module.names.get(&variable.id).map_or("", String::as_str).into();
     let component = decoration(Decoration::Component).unwrap_or(0);
-    let mut collector = LocationCollector { module, out, visits, is_patch, name };
+    let mut collector = LocationCollector { module, out, visits, is_patch, is_per_primitive, name };
     match (module.types.get(ty), decoration(Decoration::Location)) {
         (Some(Type::Struct { members }), location) => collector.block(*ty, members, location),
         (_, Some(location)) => _ = collector.value(*ty, location, component, 0),
@@ -120,6 +127,7 @@ struct LocationCollector<'a> {
     /// Types that may still be visited.
     visits: &'a mut u32,
     is_patch: bool,
+    is_per_primitive: bool,
     name: Arc<str>,
 }
 
@@ -134,6 +142,7 @@ impl LocationCollector<'_> {
             let is_builtin = decoration(Decoration::BuiltIn).is_some();
             let Some(location) = own.filter(|_| !is_builtin) else { continue };
             self.is_patch |= decoration(Decoration::Patch).is_some();
+            self.is_per_primitive |= decoration(Decoration::PerPrimitiveEXT).is_some();
             next = Some(self.value(*member, location, component, 0));
         }
     }
@@ -168,8 +177,16 @@ impl LocationCollector<'_> {
     }
 
     fn leaf(&mut self, location: u32, component: u32, count: u32, bytes: u32, numbers: NumericFormat) -> u32 {
-        let (is_patch, name) = (self.is_patch, Arc::clone(&self.name));
-        self.out.push(LocationValue { location, component, count, bytes, numbers, is_patch, name });
+        self.out.push(LocationValue {
+            location,
+            component,
+            count,
+            bytes,
+            numbers,
+            is_patch: self.is_patch,
+            is_per_primitive: self.is_per_primitive,
+            name: Arc::clone(&self.name),
+        });
         // Vectors of more than two 64-bit numbers take two locations.
         location.saturating_add(if bytes == 8 && count > 2 { 2 } else { 1 })
     }
@@ -245,6 +262,25 @@ mod tests {
         assert_eq!(places(&found.inputs), [(0, 0, 2, false), (1, 0, 4, true)]);
     }
 
+    #[test]
+    fn values_of_primitives_are_told_from_values_of_vertices() {
+        let found = interface(
+            ShaderStage::Fragment,
+            "#extension GL_EXT_mesh_shader : require
+             layout(location = 0) in vec2 a;
+             layout(location = 1) perprimitiveEXT in vec2 b;
+             layout(location = 2) perprimitiveEXT in Block { vec2 c; } block;
+             layout(location = 0) out vec4 color;
+             void main() { color = vec4(a + block.c, b); }",
+        );
+        let mut of_primitives: Vec<_> =
+            found.inputs.iter().map(|value| (value.location, value.is_per_primitive)).collect();
+        of_primitives.sort_unstable();
+        assert_eq!(of_primitives, [(0, false), (1, true), (2, true)]);
+        let of_primitive = found.inputs.iter().find(|value| value.is_per_primitive).unwrap();
+        assert_eq!(of_primitive.description(), "2 32-bit floats of each primitive");
+    }
+
     /// Returns the words of an instruction.
     fn code(op: ::spirv::Op, operands: &[u32]) -> Vec<u32> {
         [&[(operands.len() as u32 + 1) << 16 | op as u32], operands].concat()
@@ -284,6 +320,7 @@ mod tests {
             bytes: u32::MAX.div_ceil(8),
             numbers: NumericFormat::Uint,
             is_patch: false,
+            is_per_primitive: false,
             name: "".into(),
         };
         let words = value.words();
@@ -300,12 +337,13 @@ mod tests {
             bytes,
             numbers,
             is_patch: false,
+            is_per_primitive: false,
             name: "".into(),
         };
         let (float, sint, uint) = (NumericFormat::Float, NumericFormat::Sint, NumericFormat::Uint);
-        assert!(value(1, sint, 4).has_type_of(&value(3, uint, 4)));
-        assert!(!value(1, float, 4).has_type_of(&value(1, uint, 4)));
-        assert!(!value(1, float, 2).has_type_of(&value(1, float, 4)));
+        assert!(value(1, sint, 4).is_like(&value(3, uint, 4)));
+        assert!(!value(1, float, 4).is_like(&value(1, uint, 4)));
+        assert!(!value(1, float, 2).is_like(&value(1, float, 4)));
         assert_eq!(value(3, float, 4).words(), 9..12);
         assert_eq!(value(3, float, 2).words(), 9..12);
         assert_eq!(value(3, float, 8).words(), 9..15);

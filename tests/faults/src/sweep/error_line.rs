@@ -9,8 +9,7 @@ use crate::fault::{Fault, FaultError, Span};
 
 /// Judges the line of an error: it must name a command that has failed, behind it the object of that command, and the cause.
 ///
-/// Four other forms count: the swapchain whose window is gone, for a lost surface; the swapchain whose window has another; the
-/// swapchain that stays out of date; and what needs ray tracing on a device that was created without. Every command concerns an object, those before the device the loader,
+/// Two other forms count: the swapchain that stays out of date; and what needs ray tracing on a device that was created without. Every command concerns an object, those before the device the loader,
 /// the instance or the window.
 pub(super) fn judge_error(
     error: &str,
@@ -19,14 +18,6 @@ pub(super) fn judge_error(
     clean: &RunOutcome,
 ) -> Option<Flaw> {
     let objects = KnownObjects::of(found, clean);
-    let of_window: &[&str] = match fault.error {
-        FaultError::SurfaceLost => &[WINDOW_IS_GONE],
-        FaultError::WindowInUse => &[WINDOW_IS_IN_USE, SURFACE_IS_KEPT],
-        _ => &[],
-    };
-    if let Some((before, _)) = of_window.iter().find_map(|end| error.split_once(end)) {
-        return (!objects.end_with_swapchain(before)).then(|| Flaw::UnnamedObject(error.to_owned()));
-    }
     if fault.error == FaultError::OutOfDate
         && fault.span != Span::Once
         && let Some((before, _)) = error.split_once(STAYS_OUT_OF_DATE)
@@ -87,15 +78,6 @@ const OTHER_NAMES: [(&str, &str); 4] = [
 
 /// A part of errors about ray tracing behind the quoted name of what needs it, on a device that was created without.
 const WITHOUT_RAY_TRACING: &str = "vkCreateDevice with ray tracing returned";
-
-/// The end of an error about a lost surface, after the quoted name of the swapchain.
-const WINDOW_IS_GONE: &str = "': its window is gone";
-
-/// The end of an error about a window that another swapchain has, after the quoted name of the swapchain.
-const WINDOW_IS_IN_USE: &str = "': its window has another swapchain";
-
-/// The end of an error about a window whose former surface something keeps, after the quoted name of the swapchain.
-const SURFACE_IS_KEPT: &str = "': views of its images";
 
 /// The end of a scenario's error about a swapchain without an image, after its quoted name.
 const STAYS_OUT_OF_DATE: &str = "' stays out of date";
@@ -183,7 +165,6 @@ mod tests {
         for named in [
             "error: rain: vkMapMemory failed for 'rain': ERROR_SURFACE_LOST_KHR",
             "error: no device (vkGetPhysicalDeviceSurfaceSupportKHR failed for 'window': ERROR_SURFACE_LOST_KHR)",
-            "error: swapchain 'main': its window is gone; resume it",
             "error: shader 'a' needs ray queries: vkCreateDevice with ray tracing returned: ERROR_SURFACE_LOST_KHR",
         ] {
             assert_eq!(judge(FaultError::SurfaceLost, named), None, "{named}");
@@ -192,26 +173,14 @@ mod tests {
             "error: out of host memory in vkMapMemory",
             "error: out of host memory in vkMapMemory for ''",
             "error: out of host memory in vkMapMemory for 'snow'",
-            "error: swapchain 'other': its window is gone; resume it",
             "error: shader 'b' needs ray queries: vkCreateDevice with ray tracing returned: ERROR_SURFACE_LOST_KHR",
             "error: the device was lost in vkQueueSubmit2; the graphics queue had not finished submission 3 'frame'",
             "error: 'rain': vkMapMemory failed: unknown",
             "error: no vkMapMemory after vkCreateBuffer for 'rain'",
-            "error: swapchain '': its window is gone; resume it",
             "error: no ray queries: vkCreateDevice with ray tracing returned 'lost'",
         ] {
             let flaw = Some(Flaw::UnnamedObject(unnamed.to_owned()));
             assert_eq!(judge(FaultError::SurfaceLost, unnamed), flaw, "{unnamed}");
-        }
-        let in_use = [
-            "error: swapchain 'main': its window has another swapchain, or another program draws to it",
-            "error: 'main': views of its images, or command buffers that were not submitted, keep its surface",
-        ];
-        for named in in_use {
-            assert_eq!(judge(FaultError::WindowInUse, named), None, "{named}");
-            let unnamed = named.replace("main", "other");
-            let flaw = Some(Flaw::UnnamedObject(unnamed.clone()));
-            assert_eq!(judge(FaultError::WindowInUse, &unnamed), flaw, "{unnamed}");
         }
         let attached = "error: lvkMapMemory for 'rain'";
         assert_eq!(judge(FaultError::HostMemory, attached), Some(Flaw::UnnamedCommand(attached.to_owned())));

@@ -71,6 +71,7 @@ fn scenario(name: &str) -> Option<Scenario> {
         "window" => window::frames_and_resize,
         #[cfg(target_os = "linux")]
         "another_window" => window::another_window,
+        #[cfg(target_os = "linux")]
         "kept_surface" => window::kept_surface,
         _ => return None,
     })

@@ -70,8 +70,8 @@ pub(crate) fn another_window() -> Result<Vec<u8>, Failure> {
     Ok([first, second].concat())
 }
 
-/// Suspends a swapchain while a command buffer keeps its surface, and goes on in the same window. Returns the colours that the window
-/// shows before and after.
+/// Suspends a swapchain while a command buffer keeps its surface, goes on in another window, and then in the first again. Returns the
+/// colours that the windows show.
 pub(crate) fn kept_surface() -> Result<Vec<u8>, Failure> {
     let (window, ctx, swapchain) = start()?;
     let first = show(&ctx, *swapchain, &window, RED)?;
@@ -79,16 +79,25 @@ pub(crate) fn kept_surface() -> Result<Vec<u8>, Failure> {
     let mut kept = ctx.acquire_command_buffer()?;
     let target = [ColorAttachment::clear(image.texture(), RED)];
     drop(kept.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
-    match ctx.suspend_swapchain(*swapchain) {
-        Err(lvk::Error::InvalidUsage { .. }) => {}
-        Err(error) => return Err(error.into()),
-        Ok(()) => return Err("the suspension does not tell of the surface".into()),
-    }
+    suspend_with_surface(&ctx, *swapchain)?;
+    let other = Arc::new(XWindow::open()?);
+    ctx.resume_swapchain(*swapchain, &(other.clone() as Arc<_>), [64, 48])?;
+    let second = show(&ctx, *swapchain, &other, BLUE)?;
+    suspend_with_surface(&ctx, *swapchain)?;
     ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48])?;
     drop(kept);
-    let second = show(&ctx, *swapchain, &window, BLUE)?;
+    let third = show(&ctx, *swapchain, &window, BLUE)?;
     ctx.wait_idle()?;
-    Ok([first, second].concat())
+    Ok([first, second, third].concat())
+}
+
+/// Suspends a swapchain, which tells that something keeps its surface.
+fn suspend_with_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<(), Failure> {
+    match ctx.suspend_swapchain(swapchain) {
+        Err(lvk::Error::InvalidUsage { .. }) => Ok(()),
+        Err(error) => Err(error.into()),
+        Ok(()) => Err("the suspension does not tell of the surface".into()),
+    }
 }
 
 /// Presents frames until the window shows the colour.
