@@ -1,5 +1,7 @@
 //! Textures of scenes on the device.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureKind, TextureUsage};
 
 use crate::hybrid::half_float::half_bits;
@@ -40,10 +42,27 @@ fn with_mips(ctx: &Context, texture: &Texture, encoding: Encoding) -> lvk::Resul
     })
 }
 
+/// A sky, the edge of its cube, and the cube's texels.
+type BakedSky = (Sky, u32, Arc<[u16]>);
+
+/// The sky that was baked last. A renderer that is made anew, as for another method, has the same.
+static LAST_SKY: Mutex<Option<BakedSky>> = Mutex::new(None);
+
+/// The texels of a sky as half floats, face by face.
+fn baked_sky(sky: &Sky, size: u32) -> Arc<[u16]> {
+    let mut last = LAST_SKY.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, _, texels)) = last.as_ref().filter(|(of, edge, _)| of == sky && *edge == size) {
+        return Arc::clone(texels);
+    }
+    let faces = sky.bake_cube(size);
+    let texels: Arc<[u16]> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
+    *last = Some((*sky, size, Arc::clone(&texels)));
+    texels
+}
+
 /// A sky as a cube with edges of `size` texels.
 pub(crate) fn sky(ctx: &Context, sky: &Sky, size: u32) -> lvk::Result<Holder<TextureHandle>> {
-    let faces = sky.bake_cube(size);
-    let texels: Vec<u16> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
+    let texels = baked_sky(sky, size);
     ctx.create_texture(&TextureDesc {
         kind: TextureKind::Cube,
         format: Format::Rgba16Float,

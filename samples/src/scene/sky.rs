@@ -55,15 +55,19 @@ impl Sky {
     }
 
     /// The sky as the six faces of a cube map, `size` texels on an edge, each texel being R, G, B, 1. Faces and
-    /// orientation are Vulkan's: +X -X +Y -Y +Z -Z, rows from the top.
+    /// orientation are Vulkan's: +X -X +Y -Y +Z -Z, rows from the top. A thread bakes each face.
     pub fn bake_cube(&self, size: u32) -> [Vec<[f32; 4]>; 6] {
-        std::array::from_fn(|face| {
+        let bake = |face| -> Vec<_> {
             let texel = |i: u32| {
                 let [s, t] = [i % size, i / size].map(|k| (2 * k + 1) as f32 / size as f32 - 1.0);
                 let [r, g, b] = self.radiance(cube_direction(face, s, t));
                 [r, g, b, 1.0]
             };
             (0..size * size).map(texel).collect()
+        };
+        std::thread::scope(|scope| {
+            let faces: [_; 6] = std::array::from_fn(|face| scope.spawn(move || bake(face)));
+            faces.map(|face| face.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
         })
     }
 

@@ -318,12 +318,17 @@ impl Viewer {
         Ok(())
     }
 
-    /// The mean radiance of each pixel of the last frame, rows from the top.
+    /// The mean radiance of each pixel of the last frame, rows from the top. Zeros until there is a frame of this scene, and of a path that
+    /// began anew.
     ///
     /// # Errors
     /// [`SampleError::Device`].
     pub fn radiance(&self) -> Result<Vec<[f32; 3]>, SampleError> {
-        let count = self.summed_samples().max(1) as f32;
+        let count = self.summed_samples() as f32;
+        if self.is_first() || count == 0.0 {
+            let [width, height] = self.config.extent();
+            return Ok(vec![[0.0; 3]; width as usize * height as usize]);
+        }
         let mean = |[red, green, blue, _]: [f32; 4]| [red, green, blue].map(|sum| sum / count);
         Ok(self.sums()?.into_iter().map(mean).collect())
     }

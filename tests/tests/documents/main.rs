@@ -24,4 +24,5 @@ mod readme;
 mod rust_modules;
 mod rust_tokens;
 mod sums;
+mod tables;
 mod unsafety;

@@ -43,7 +43,7 @@ fn complaints(lines: &[&str], needed: &BTreeSet<&str>, exists: impl Fn(&str) -> 
 }
 
 /// Returns the files of the repository that git knows or would add; every file where there is no repository.
-fn files() -> Vec<String> {
+pub fn files() -> Vec<String> {
     let mut git = std::process::Command::new("git");
     git.args(["ls-files", "--cached", "--others", "--exclude-standard"]).current_dir(project());
     match git.output() {

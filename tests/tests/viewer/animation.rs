@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use glam::Vec3;
+use image::RgbaImage;
 use lvk::Context;
 use lvk_gltf::{Animation, Channel, ChannelPath, Interpolation, Keyframes, Model};
 use lvk_samples::app::headless;
@@ -9,6 +10,7 @@ use lvk_samples::app::sample::{FrameTime, Sample as _};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::device;
+use lvk_tests::image_comparison::{Tolerance, assert_similar};
 use lvk_tests::rtx_sample::{contexts_and_paths, software_device};
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::model::posed;
@@ -103,6 +105,46 @@ fn a_structure_is_refitted_in_each_frame_that_moves_and_never_built_anew() {
         headless::picture(&mut viewer).unwrap();
     }
     assert_eq!(refits(), [5], "one structure, of five poses");
+}
+
+/// The eye stands still, and things move, with their shadows and reflections: where a thing was a few frames before, the picture shows what is
+/// there now.
+#[test]
+fn what_moves_leaves_no_trail_under_a_still_eye() {
+    let Some(ctx) = software_device() else { return };
+    let model = moving_model();
+    let time = |frame| FrameTime { frame, frames_per_round: 1000, frames_per_second: 30 };
+    let reference = |frame| {
+        let still = posed(model.clone(), Some(0), time(frame).seconds() as f32);
+        let mut viewer = shown(&ctx, (Method::PathTrace, RayPath::Query), &still, 256);
+        headless::picture(&mut viewer).unwrap()
+    };
+    let mut viewer = shown(&ctx, (Method::Hybrid, RayPath::Query), &model, 1);
+    viewer.configure(&ViewerConfig { is_progressive: true, ..*viewer.config() }).unwrap();
+    viewer.play(Some(0), 0.0);
+    let (frames, camera) = (24, view(1).camera);
+    let mut last = Vec::new();
+    for frame in 0..frames {
+        viewer.update(time(frame));
+        viewer.set_view(&camera);
+        last = headless::picture(&mut viewer).unwrap();
+    }
+    let (now, before) = (reference(frames - 1), reference(frames - 7));
+    let difference =
+        |a: &[u8], b: &[u8]| a.iter().zip(b).map(|(a, b)| i32::from(a.abs_diff(*b))).sum::<i32>();
+    let (mut changed, mut trail) = (0, 0);
+    for ((last, now), before) in last.chunks(4).zip(now.chunks(4)).zip(before.chunks(4)) {
+        if difference(now, before) > 60 {
+            changed += 1;
+            trail += i32::from(difference(last, before) < difference(last, now));
+        }
+    }
+    println!("{trail} of {changed}");
+    assert!(changed > 100, "{changed} pixels have changed");
+    assert!(20 * trail < changed, "{trail} of {changed} pixels show what was there");
+    let [now, last] = [now, last].map(|pixels| RgbaImage::from_raw(60, 40, pixels).unwrap());
+    let moving = Tolerance { psnr: 22.0, ssim: 0.75, flip: 0.15, ..Tolerance::default() };
+    assert_similar("after 24 frames of motion", &last, &now, &moving);
 }
 
 /// A wall that flies to the right, by its node or by the joint of its skin.

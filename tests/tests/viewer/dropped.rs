@@ -1,4 +1,4 @@
-//! Files that are dropped on the viewer.
+//! Scenes that take the place of another: files that are dropped on the viewer, and scenes of programs.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;
@@ -9,10 +9,12 @@ use lvk_samples::app::sample::Sample as _;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::rtx_sample::software_device;
-use lvk_viewer::light::Environment;
-use lvk_viewer::{Method, Viewer, ViewerConfig};
+use lvk_viewer::light::{Environment, SunSetting};
+use lvk_viewer::{CullingMode, IndirectLight, Method, PrimaryVisibility, Viewer, ViewerConfig};
 
-use crate::scenes::{View, viewer};
+use crate::moving_model::moving_model;
+use crate::paths::assert_alike;
+use crate::scenes::{View, config, configured_viewer, scene, viewer};
 use crate::still_life::still_life;
 
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -23,6 +25,37 @@ fn wait(viewer: &mut Viewer, is_there: impl Fn(&Viewer) -> bool) {
     while !is_there(viewer) {
         assert!(Instant::now() < deadline, "{} is still shown, {:?}", viewer.name(), viewer.drop_error());
         headless::picture(viewer).unwrap();
+    }
+}
+
+/// Nothing of the scene before is in the picture: no history, no cached light, no list of what was seen.
+#[test]
+fn a_scene_in_place_of_another_looks_as_in_a_viewer_of_its_own() {
+    let Some(ctx) = software_device() else { return };
+    let camera = Camera::looking_at([1.5, 1.7, 4.5], [-0.2, 0.5, 0.0], 40.0);
+    let view = View { camera, size: [60, 40], samples: 8 };
+    let environment = Environment::day(&SunSetting::default());
+    let usual = config((Method::Hybrid, RayPath::Query), &view);
+    let rasterised = ViewerConfig {
+        primary: PrimaryVisibility::Raster,
+        culling: CullingMode::Occlusion,
+        indirect: IndirectLight::Cache,
+        ..usual
+    };
+    let occluded = ViewerConfig { indirect: IndirectLight::AmbientOcclusion, ..usual };
+    for config in [rasterised, occluded] {
+        let mut own = configured_viewer(&ctx, &config, &still_life(), &environment, &view);
+        headless::picture(&mut own).unwrap();
+        let expected = own.radiance().unwrap();
+        // The same pipelines show another scene by other light, and then this one.
+        own.show(scene(&moving_model(), &Environment::uniform([3.0, 0.1, 0.1]))).unwrap();
+        own.set_view(&camera);
+        assert!(own.radiance().unwrap().iter().all(|pixel| *pixel == [0.0; 3]), "no frame of it is there");
+        headless::picture(&mut own).unwrap();
+        own.show(scene(&still_life(), &environment)).unwrap();
+        own.set_view(&camera);
+        headless::picture(&mut own).unwrap();
+        assert_alike(&format!("{:?}", config.indirect), &expected, &own.radiance().unwrap());
     }
 }
 

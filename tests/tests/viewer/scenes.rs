@@ -136,7 +136,8 @@ pub fn configured_viewer(
     viewer
 }
 
-fn scene(model: &Model, environment: &Environment) -> ViewerScene {
+/// Returns a model with its light.
+pub fn scene(model: &Model, environment: &Environment) -> ViewerScene {
     ViewerScene {
         name: "test".to_owned(),
         model: model.clone(),

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lvk::{ColorAttachment, Context, ContextDesc, Holder, RenderPassDesc, SwapchainDesc, SwapchainHandle};
+use lvk::{
+    ColorAttachment, Context, ContextDesc, Holder, RenderPassDesc, SwapchainDesc, SwapchainHandle,
+    SwapchainImage,
+};
 
 use crate::slow_work::SlowWork;
 use crate::x_window::XWindow;
@@ -75,7 +78,7 @@ pub(crate) fn another_window() -> Result<Vec<u8>, Failure> {
 pub(crate) fn kept_surface() -> Result<Vec<u8>, Failure> {
     let (window, ctx, swapchain) = start()?;
     let first = show(&ctx, *swapchain, &window, RED)?;
-    let Some(image) = ctx.next_image(*swapchain)? else { return Err("the swapchain has no image".into()) };
+    let image = next_image(&ctx, *swapchain)?;
     let mut kept = ctx.acquire_command_buffer()?;
     let target = [ColorAttachment::clear(image.texture(), RED)];
     drop(kept.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
@@ -129,19 +132,26 @@ fn present(
     color: [f32; 4],
     slow: Option<&SlowWork>,
 ) -> Result<(), Failure> {
+    let image = next_image(ctx, swapchain)?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    slow.map_or(Ok(()), |slow| slow.record(&mut cmd))?;
+    let target = [ColorAttachment::clear(image.texture(), color)];
+    drop(cmd.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
+    if let Err(error) = ctx.present(cmd, image) {
+        // An application may go on with the next frame, while the GPU is at work on this one.
+        let _ = ctx.next_image(swapchain);
+        return Err(error.into());
+    }
+    Ok(())
+}
+
+/// Returns the image of the next frame that has one.
+fn next_image(ctx: &Context, swapchain: SwapchainHandle) -> Result<SwapchainImage, Failure> {
     for _ in 0..FRAMES_WITHOUT_IMAGE {
         ctx.next_frame()?;
-        let Some(image) = ctx.next_image(swapchain)? else { continue };
-        let mut cmd = ctx.acquire_command_buffer()?;
-        slow.map_or(Ok(()), |slow| slow.record(&mut cmd))?;
-        let target = [ColorAttachment::clear(image.texture(), color)];
-        drop(cmd.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
-        if let Err(error) = ctx.present(cmd, image) {
-            // An application may go on with the next frame, while the GPU is at work on this one.
-            let _ = ctx.next_image(swapchain);
-            return Err(error.into());
+        if let Some(image) = ctx.next_image(swapchain)? {
+            return Ok(image);
         }
-        return Ok(());
     }
     Err(format!("the swapchain '{SWAPCHAIN}' stays out of date: {FRAMES_WITHOUT_IMAGE} frames have no image")
         .into())
