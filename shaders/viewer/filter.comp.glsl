@@ -49,8 +49,8 @@ vec4 blurred(Blur blur) {
 void filterPixel(uvec2 at) {
     ivec2 pixel = ivec2(at);
     uint place = pixelPlace(pixel);
-    uint from = argument & 1u;
-    uint to = 1u - from;
+    uint to = argument & 1u;
+    uint from = 1u - to;
     Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, place)]);
     vec4 ownMatte = frame.planes.at[planePlace(kPlaneMatte + from, place)];
     vec4 ownMirrored = frame.planes.at[planePlace(kPlaneMirrored + from, place)];

@@ -8,28 +8,84 @@ const float kMostFrames = 48.0;
 const float kLeastMirrorFrames = 2.0;
 // While something else moves, whose light and shadow move with it.
 const float kMostMovingFrames = 16.0;
+// While a surface turns: until it has turned by so many radians, but these at least.
+const float kMostTurn = 0.1;
+const float kLeastTurnFrames = 2.0;
+// Where light around a pixel has changed, as by a shadow that moves: by more than so many standard errors, in a square of pixels with this
+// half side.
+const float kMostChangedFrames = 3.0;
+const float kMostErrors = 2.5;
+const int kNearbyPixels = 2;
 // While it stands.
 const float kMostStillFrames = 65536.0;
 // Frames before the variance over time says enough.
 const float kFirstFrames = 4.0;
 // Of the weight of the nearest four pixels.
 const float kLeastShare = 0.05;
+// Of the angle between normals of one surface.
+const float kLeastCosine = 0.8;
+// Of a surface that moves, over its distance from the eye.
+const float kLeastMotion = 1e-5;
 
 struct History {
     vec4 matte;
     vec4 mirrored;
     vec4 moments;
+    vec3 normal; // of the surface in the frame before
 };
 
 bool isSameSurface(Seen seen, vec3 point, Seen before, ivec2 pixel) {
-    if (isSky(before) || before.instance != seen.instance || dot(before.normal, seen.normal) < 0.8) {
+    if (isSky(before) || before.instance != seen.instance || dot(before.normal, seen.normal) < kLeastCosine) {
         return false;
     }
     vec3 way = seenPoint(frame.seenBefore, pixel, before.distance) - point;
     return abs(dot(way, seen.normal)) < 0.01 * seen.distance;
 }
 
-const History kNoHistory = History(vec4(0.0), vec4(0.0), vec4(0.0));
+// Brightnesses around a pixel: sums of this frame's, of their squares, and of the means of the frames before.
+struct Nearby {
+    vec2 sum;
+    vec2 squares;
+    vec2 before;
+    float count;
+};
+
+// The light of this frame on the same surface around a pixel, and of the frames before around the pixel `before` of theirs.
+Nearby nearbyLight(ivec2 pixel, ivec2 before, Seen seen) {
+    Nearby nearby = Nearby(vec2(0.0), vec2(0.0), vec2(0.0), 0.0);
+    ivec2 last = ivec2(frame.camera.width, frame.camera.height) - 1;
+    for (int y = -kNearbyPixels; y <= kNearbyPixels; ++y) {
+        for (int x = -kNearbyPixels; x <= kNearbyPixels; ++x) {
+            ivec2 now = pixel + ivec2(x, y);
+            ivec2 then = before + ivec2(x, y);
+            if (any(lessThan(min(now, then), ivec2(0))) || any(greaterThan(max(now, then), last))) {
+                continue;
+            }
+            Seen other = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, pixelPlace(now))]);
+            Seen old = unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, pixelPlace(then))]);
+            if (isSky(other) || isSky(old) || other.instance != seen.instance || old.instance != seen.instance) {
+                continue;
+            }
+            vec2 light = vec2(brightness(frame.planes.at[planePlace(kPlaneMatte, pixelPlace(now))].rgb),
+                              brightness(frame.planes.at[planePlace(kPlaneMirrored, pixelPlace(now))].rgb));
+            nearby.sum += light;
+            nearby.squares += light * light;
+            nearby.before += frame.planes.at[previousPlane(kPlaneMoments, pixelPlace(then))].xy;
+            nearby.count += 1.0;
+        }
+    }
+    return nearby;
+}
+
+// True for matte and mirrored light that has changed: the mean around a pixel differs by more than noise does.
+bvec2 hasChanged(Nearby nearby) {
+    float count = max(nearby.count, 1.0);
+    vec2 mean = nearby.sum / count;
+    vec2 error = sqrt(max(nearby.squares / count - mean * mean, 0.0) / count);
+    return greaterThan(abs(mean - nearby.before / count), kMostErrors * error);
+}
+
+const History kNoHistory = History(vec4(0.0), vec4(0.0), vec4(0.0), vec3(0.0));
 
 // Adds the history of a pixel that saw the same surface, which was at `point`. Returns its weight, or 0.
 float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 point) {
@@ -38,9 +94,11 @@ float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 p
         return 0.0;
     }
     uint from = pixelPlace(pixel);
-    if (!isSameSurface(seen, point, unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]), pixel)) {
+    Seen before = unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]);
+    if (!isSameSurface(seen, point, before, pixel)) {
         return 0.0;
     }
+    sum.normal += weight * before.normal;
     sum.matte += weight * frame.planes.at[previousPlane(kPlaneMatteHistory, from)];
     sum.mirrored += weight * frame.planes.at[previousPlane(kPlaneMirroredHistory, from)];
     sum.moments += weight * frame.planes.at[previousPlane(kPlaneMoments, from)];
@@ -68,7 +126,7 @@ History historyAt(vec2 place, Seen seen, vec3 point) {
         }
     }
     float inverse = total > 0.0 ? 1.0 / total : 0.0;
-    return History(sum.matte * inverse, sum.mirrored * inverse, sum.moments * inverse);
+    return History(sum.matte * inverse, sum.mirrored * inverse, sum.moments * inverse, sum.normal * inverse);
 }
 
 // A mean with one more number, of which it holds `most` at most; the last component counts them.
@@ -83,6 +141,11 @@ float framesOfHighlight(Seen seen, vec3 point, vec3 pointBefore) {
     return seen.roughness * seen.roughness / max(length(turned), 1e-6);
 }
 
+// Frames in which a surface turns so little that its light stays.
+float framesOfTurn(vec3 normal, vec3 before) {
+    return kMostTurn / max(length(normal - before), 1e-6);
+}
+
 void temporalPixel(uvec2 at) {
     ivec2 pixel = ivec2(at);
     uint place = pixelPlace(pixel);
@@ -92,13 +155,20 @@ void temporalPixel(uvec2 at) {
     History history = kNoHistory;
     vec3 point = seenPoint(frame.camera, pixel, seen.distance);
     vec3 before = frame.planes.at[planePlace(kPlaneBefore, place)].xyz;
-    if (frame.frameNumber > 0u && !isSky(seen)) {
-        vec2 moved = motionOf(point, before);
-        history = historyAt(vec2(pixel) + 0.5 - moved, seen, before);
-    }
-    bool isStill = frame.stillCount > 0u;
     float matteFrames = frame.sceneMoves != 0u ? kMostMovingFrames : kMostFrames;
     float mirrorFrames = clamp(framesOfHighlight(seen, point, before), kLeastMirrorFrames, matteFrames);
+    if (frame.frameNumber > 0u && !isSky(seen)) {
+        vec2 from = vec2(pixel) + 0.5 - motionOf(point, before);
+        history = historyAt(from, seen, before);
+        if (frame.sceneMoves != 0u && history.matte.a > 0.0) {
+            bool hasMoved = distance(point, before) > kLeastMotion * seen.distance;
+            float turnFrames = hasMoved ? max(framesOfTurn(seen.normal, history.normal), kLeastTurnFrames) : kMostFrames;
+            bvec2 changed = hasChanged(nearbyLight(pixel, ivec2(floor(from)), seen));
+            matteFrames = min(matteFrames, changed.x ? min(turnFrames, kMostChangedFrames) : turnFrames);
+            mirrorFrames = min(mirrorFrames, changed.y ? min(turnFrames, kMostChangedFrames) : turnFrames);
+        }
+    }
+    bool isStill = frame.stillCount > 0u;
     history.matte = extended(history.matte, matte, isStill ? kMostStillFrames : matteFrames);
     history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillFrames : mirrorFrames);
     vec2 bright = vec2(brightness(matte), brightness(mirrored));
@@ -111,8 +181,8 @@ void temporalPixel(uvec2 at) {
     frame.planes.at[currentPlane(kPlaneMatteHistory, place)] = history.matte;
     frame.planes.at[currentPlane(kPlaneMirroredHistory, place)] = history.mirrored;
     frame.planes.at[currentPlane(kPlaneMoments, place)] = history.moments;
-    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(history.matte.rgb, variance.x);
-    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(history.mirrored.rgb, variance.y);
+    frame.planes.at[planePlace(kPlaneMatte + 1u, place)] = vec4(history.matte.rgb, variance.x);
+    frame.planes.at[planePlace(kPlaneMirrored + 1u, place)] = vec4(history.mirrored.rgb, variance.y);
 }
 
 #define PIXEL_FUNCTION temporalPixel

@@ -33,7 +33,7 @@ fn a_row_of_another_table_is_noticed() {
 }
 
 #[test]
-fn rows_have_as_many_cells_as_the_heads_of_their_tables() {
+fn each_line_of_a_table_has_as_many_cells_as_its_head() {
     let (mut count, mut uneven) = (0, Vec::new());
     for file in files().into_iter().filter(|file| file.ends_with(".md")) {
         count += 1;

@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use glam::Vec3;
-use image::RgbaImage;
 use lvk::Context;
 use lvk_gltf::{Animation, Channel, ChannelPath, Interpolation, Keyframes, Model};
 use lvk_samples::app::headless;
@@ -10,7 +9,6 @@ use lvk_samples::app::sample::{FrameTime, Sample as _};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::device;
-use lvk_tests::image_comparison::{Tolerance, assert_similar};
 use lvk_tests::rtx_sample::{contexts_and_paths, software_device};
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::model::posed;
@@ -107,44 +105,48 @@ fn a_structure_is_refitted_in_each_frame_that_moves_and_never_built_anew() {
     assert_eq!(refits(), [5], "one structure, of five poses");
 }
 
-/// The eye stands still, and things move, with their shadows and reflections: where a thing was a few frames before, the picture shows what is
-/// there now.
+/// The eye stands still, and things move and turn, with their shadows: the picture is as of a still of the same instant, not of a few frames
+/// before.
 #[test]
-fn what_moves_leaves_no_trail_under_a_still_eye() {
+fn moving_things_leave_no_trail_under_a_still_eye() {
     let Some(ctx) = software_device() else { return };
     let model = moving_model();
-    let time = |frame| FrameTime { frame, frames_per_round: 1000, frames_per_second: 30 };
-    let reference = |frame| {
-        let still = posed(model.clone(), Some(0), time(frame).seconds() as f32);
-        let mut viewer = shown(&ctx, (Method::PathTrace, RayPath::Query), &still, 256);
-        headless::picture(&mut viewer).unwrap()
+    let view = |samples| View { size: [120, 80], ..view(samples) };
+    let shown = |model: &Model, samples| {
+        let environment = Environment::day(&SunSetting::default());
+        viewer(&ctx, (Method::Hybrid, RayPath::Query), model, &environment, &view(samples))
     };
-    let mut viewer = shown(&ctx, (Method::Hybrid, RayPath::Query), &model, 1);
-    viewer.configure(&ViewerConfig { is_progressive: true, ..*viewer.config() }).unwrap();
-    viewer.play(Some(0), 0.0);
-    let (frames, camera) = (24, view(1).camera);
+    let time = |frame| FrameTime { frame, frames_per_round: 1000, frames_per_second: 30 };
+    let still = |frame| {
+        let still = posed(model.clone(), Some(0), time(frame).seconds() as f32);
+        headless::picture(&mut shown(&still, 64)).unwrap()
+    };
+    let mut played = shown(&model, 1);
+    played.configure(&ViewerConfig { is_progressive: true, ..*played.config() }).unwrap();
+    played.play(Some(0), 0.0);
     let mut last = Vec::new();
-    for frame in 0..frames {
-        viewer.update(time(frame));
-        viewer.set_view(&camera);
-        last = headless::picture(&mut viewer).unwrap();
+    for frame in 0..24 {
+        played.update(time(frame));
+        played.set_view(&view(1).camera);
+        last = headless::picture(&mut played).unwrap();
     }
-    let (now, before) = (reference(frames - 1), reference(frames - 7));
+    let (now, before) = (still(23), still(17));
     let difference =
-        |a: &[u8], b: &[u8]| a.iter().zip(b).map(|(a, b)| i32::from(a.abs_diff(*b))).sum::<i32>();
-    let (mut changed, mut trail) = (0, 0);
+        |a: &[u8], b: &[u8]| a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum::<u32>();
+    let (mut change, mut trail) = (0, 0);
     for ((last, now), before) in last.chunks(4).zip(now.chunks(4)).zip(before.chunks(4)) {
         if difference(now, before) > 60 {
-            changed += 1;
-            trail += i32::from(difference(last, before) < difference(last, now));
+            change += difference(now, before);
+            trail += difference(last, now);
         }
     }
-    println!("{trail} of {changed}");
-    assert!(changed > 100, "{changed} pixels have changed");
-    assert!(20 * trail < changed, "{trail} of {changed} pixels show what was there");
-    let [now, last] = [now, last].map(|pixels| RgbaImage::from_raw(60, 40, pixels).unwrap());
-    let moving = Tolerance { psnr: 22.0, ssim: 0.75, flip: 0.15, ..Tolerance::default() };
-    assert_similar("after 24 frames of motion", &last, &now, &moving);
+    let share = f64::from(trail) / f64::from(change);
+    eprintln!(
+        "{share:.3} of a change of {change}; whole picture {:.3}",
+        f64::from(difference(&last, &now)) / now.len() as f64
+    );
+    assert!(change > 20_000, "{change}");
+    assert!(share < 0.33, "{share} of the change is not there yet");
 }
 
 /// A wall that flies to the right, by its node or by the joint of its skin.

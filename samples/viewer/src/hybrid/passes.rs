@@ -80,7 +80,7 @@ impl Passes {
         planes: BufferHandle,
         extent: [u32; 2],
     ) -> lvk::Result<()> {
-        let last = FILTER_STEPS & 1;
+        let last = (FILTER_STEPS - 1) & 1;
         let steps = (0..FILTER_STEPS).map(|step| (&self.filter, step));
         let all = [(&self.temporal, 0)].into_iter().chain(steps);
         for (pipeline, argument) in all.chain([(&self.composite, last), (&self.antialias, last)]) {
