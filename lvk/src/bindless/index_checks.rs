@@ -168,6 +168,16 @@ fn accesses_of(faults: &[IndexFault]) -> u32 {
     faults.iter().fold(0, |sum: u32, fault| sum.wrapping_add(fault.count))
 }
 
+/// Returns the number of a name, which it gets when it first comes: modules that are compiled again have the numbers of those before.
+fn number_of(names: &mut Vec<String>, name: &str) -> u32 {
+    let known = names.iter().position(|known| known == name);
+    let number = known.unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    });
+    number as u32
+}
+
 #[derive(Default)]
 struct SlotOwners {
     /// The current or last owner of a slot.
@@ -208,11 +218,9 @@ impl IndexChecks {
 
     /// Returns the check parameters of a module of this name.
     pub(crate) fn plan(&self, shader: &str) -> CheckPlan {
-        let mut known = self.lock();
-        known.shaders.push(shader.to_owned());
         CheckPlan {
             address: self.buffer.address,
-            shader: known.shaders.len() as u32 - 1,
+            shader: number_of(&mut self.lock().shaders, shader),
             arrays: self.arrays,
             declarations: self.declarations,
         }
@@ -386,4 +394,16 @@ fn barrier(gpu: &Gpu, commands: vk::CommandBuffer, from: SyncScope, to: SyncScop
     let info = vk::DependencyInfo::default().memory_barriers(&barrier);
     // SAFETY: the command buffer is being recorded outside of a pass.
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_module_that_is_compiled_again_has_the_number_of_the_one_before() {
+        let mut names = Vec::new();
+        let numbers = ["sky", "sea", "sky", "land", "sea"].map(|name| number_of(&mut names, name));
+        assert_eq!((numbers, names.len()), ([0, 1, 0, 2, 1], 3));
+    }
 }

@@ -37,9 +37,9 @@ impl Readback {
 
     /// Returns the bytes. Waits for the GPU if they are not available yet (`vkWaitSemaphores`).
     pub fn wait(&self) -> Result<Vec<u8>> {
-        let mut bytes = vec![0; self.target.as_ref().map_or(0, |target| target.size_bytes as usize)];
-        self.wait_into(&mut bytes)?;
-        Ok(bytes)
+        self.ctx.wait(self.submission)?;
+        let read = |target: &Arc<Buffer>| target.read_bytes("Readback::wait", 0, target.size_bytes);
+        self.target.as_ref().map_or_else(|| Ok(Vec::new()), read)
     }
 
     /// Returns the submission that copies the bytes.
@@ -97,6 +97,18 @@ impl Context {
             )
     }
 
+    /// Creates a buffer that the GPU copies into for the host.
+    pub(super) fn readback_buffer(&self, size: u64) -> Result<Arc<Buffer>> {
+        let desc = BufferDesc {
+            size_bytes: size,
+            usage: BufferUsage::empty(),
+            memory: MemoryKind::Readback,
+            data: None,
+            debug_name: READBACK,
+        };
+        Ok(Arc::new(Buffer::new(&self.device_state().gpu, &desc, InternalUsage::NONE)?))
+    }
+
     /// Submits a copy into a new buffer. `record` looks up the source by handle, or defers the destruction of the source,
     /// as the wait for the copy may fail. An object that another thread destroys before the command buffer is open does
     /// not wait for the copy.
@@ -109,14 +121,7 @@ impl Context {
             let submission = SubmitHandle::default();
             return Ok(Readback { target: None, submission, ctx: self.clone() });
         }
-        let desc = BufferDesc {
-            size_bytes: size,
-            usage: BufferUsage::empty(),
-            memory: MemoryKind::Readback,
-            data: None,
-            debug_name: READBACK,
-        };
-        let target = Arc::new(Buffer::new(&self.device_state().gpu, &desc, InternalUsage::NONE)?);
+        let target = self.readback_buffer(size)?;
         let mut cmd = self.acquire_command_buffer()?;
         record(&mut cmd, &target)?;
         // Before the submission: if that fails half-way, the GPU may still write the buffer.

@@ -35,6 +35,9 @@ const ALIGNMENT: u64 = 256;
 /// Maximum bytes of parts that share one buffer, because devices limit buffer sizes. A larger part has a buffer alone.
 const MAX_GROUP_BYTES: u64 = 256 << 20;
 
+/// Times that a BLAS is serialised while other threads build it.
+const MOST_TRIES: u32 = 8;
+
 /// Result of [`Context::load_or_create_blas`].
 pub struct LoadedBlas {
     /// The BLAS.
@@ -50,6 +53,10 @@ impl Context {
     /// With software ray queries only, the bytes work on every device with the same version of the library.
     ///
     /// Keep the file where only the program writes to it: its checksum detects damage, not manipulation.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for a TLAS, for a BLAS with opacity micromaps, and for one that other threads build again and again
+    /// meanwhile; [`StaleHandle`](Error::StaleHandle).
     pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
         let object = self.device_state().store.accel_structs.get(handle)?;
         let blas = object.blas()?;
@@ -57,7 +64,6 @@ impl Context {
             let message = "a BLAS with opacity micromaps cannot be serialised; build it at each start";
             return Err(Error::usage(&object.name, message));
         }
-        let body = blas.structures();
         let geometries = blas.geometries.iter().map(file_geometry).collect();
         if self.device_state().gpu.accel.is_none() {
             let bytes = self.read_software_bytes(blas);
@@ -65,9 +71,9 @@ impl Context {
             let parts = vec![BlasFilePart { driver, map: None }];
             return Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }));
         }
-        let sizes = self.serialized_sizes(&object, &body)?;
-        let mut parts = Vec::with_capacity(sizes.len());
-        for (driver, shape) in self.serialize_parts(&object, &body, &sizes)?.into_iter().zip(&blas.parts) {
+        let drivers = self.serialize_parts(&object)?;
+        let mut parts = Vec::with_capacity(drivers.len());
+        for (driver, shape) in drivers.into_iter().zip(&blas.parts) {
             let map =
                 self.read_primitive_map(shape).map_err(|error| error.with_owner(READBACK, &object.name))?;
             parts.push(BlasFilePart { driver, map });
@@ -129,6 +135,38 @@ impl Context {
         }
     }
 
+    /// Returns the driver's data of each part. Begins again where another thread submits a build meanwhile, of which the sizes may be others.
+    fn serialize_parts(&self, object: &AccelStruct) -> Result<Vec<Vec<u8>>> {
+        for _ in 0..MOST_TRIES {
+            if let Some(parts) = self.try_to_serialize(object)? {
+                return Ok(parts);
+            }
+        }
+        let message = "other threads build it all the time; serialise it between two builds";
+        Err(Error::usage(&object.name, message))
+    }
+
+    /// Returns the driver's data of each part, or `None` where a build was submitted meanwhile.
+    fn try_to_serialize(&self, object: &AccelStruct) -> Result<Option<Vec<Vec<u8>>>> {
+        let mut all = Vec::new();
+        // The first build may not be submitted yet.
+        self.flush()?;
+        let version = object.blas()?.version();
+        let body = object.blas()?.structures();
+        let sizes = self.serialized_sizes(object, &body)?;
+        #[cfg(any(test, feature = "test-hooks"))]
+        crate::test_support::submit_hook::run_serialize_hook();
+        for group in group_by_bytes(&sizes, self.max_group_bytes()) {
+            let sizes = &sizes[group.clone()];
+            let bytes = self.serialize_group(object, version, (&body, group), sizes);
+            let Some(bytes) = bytes.map_err(|error| error.with_owner(READBACK, &object.name))? else {
+                return Ok(None);
+            };
+            all.extend(bytes);
+        }
+        Ok(Some(all))
+    }
+
     fn serialized_sizes(&self, object: &AccelStruct, body: &Arc<BlasStructures>) -> Result<Vec<u64>> {
         let count = body.structures.len() as u32;
         let desc = QueryPoolDesc { count, debug_name: &object.name, ..Default::default() };
@@ -144,47 +182,44 @@ impl Context {
         sizes.ok_or_else(|| Error::usage(&object.name, "the device returned no size for a serialised BLAS"))
     }
 
-    fn serialize_parts(
-        &self,
-        object: &AccelStruct,
-        body: &Arc<BlasStructures>,
-        sizes: &[u64],
-    ) -> Result<Vec<Vec<u8>>> {
-        let mut all = Vec::with_capacity(sizes.len());
-        for group in group_by_bytes(sizes, self.max_group_bytes()) {
-            let sizes = &sizes[group.clone()];
-            let bytes = self.serialize_group(object, body, group, sizes);
-            all.extend(bytes.map_err(|error| error.with_owner(READBACK, &object.name))?);
-        }
-        Ok(all)
-    }
-
-    /// Serialises parts that share one buffer.
+    /// Serialises parts that share one buffer. `None` if builds were submitted since `version`: the prologue, which cannot be submitted while
+    /// the version is compared, runs before all later ones.
     fn serialize_group(
         &self,
         object: &AccelStruct,
-        body: &Arc<BlasStructures>,
-        group: Range<usize>,
+        version: [u64; 2],
+        (body, group): (&Arc<BlasStructures>, Range<usize>),
         sizes: &[u64],
-    ) -> Result<Vec<Vec<u8>>> {
+    ) -> Result<Option<Vec<Vec<u8>>>> {
+        let (shared, blas) = (self.device_state(), object.blas()?);
         let places = AlignedOffsets::new(sizes);
         let buffer = self.blob_buffer(&object.name, places.total)?;
+        let target = self.readback_buffer(places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
-        let mut bytes = vec![0; places.total as usize];
-        self.read_back(places.total, &mut bytes, |cmd, target| {
-            self.device_state().free_later(DeferredObject::Buffer(Arc::clone(&buffer)));
-            // A compaction may replace the structures while the copy is under way.
-            self.device_state().free_later(DeferredObject::BlasStorage(Arc::clone(body)));
+        let copy = BufferCopy { source_offset: base - buffer.address, target_offset: 0, size: places.total };
+        let recorded = self.record_in_prologue(|cmd| {
+            if blas.version() != version {
+                return Ok(false);
+            }
             cmd.serialize_parts(object, &body.structures[group], &buffer, &addresses)?;
-            cmd.copy_buffer_objects(
-                &buffer,
-                target,
-                &[BufferCopy { source_offset: base - buffer.address, target_offset: 0, size: places.total }],
-            )
-        })?;
-        let part = |(offset, size): (&u64, &u64)| bytes[*offset as usize..][..*size as usize].to_vec();
-        Ok(places.offsets.iter().zip(sizes).map(part).collect())
+            cmd.copy_buffer_objects(&buffer, &target, &[copy])?;
+            Ok(true)
+        });
+        // A compaction may replace the structures while the copy is under way.
+        shared.free_later(DeferredObject::BlasStorage(Arc::clone(body)));
+        for used in [buffer, Arc::clone(&target)] {
+            shared.free_later(DeferredObject::Buffer(used));
+        }
+        if !recorded? {
+            return Ok(None);
+        }
+        self.wait(self.flush()?)?;
+        let parts = places.offsets.iter().zip(sizes);
+        parts
+            .map(|(offset, size)| target.read_bytes("serialize_blas", *offset, *size))
+            .collect::<Result<_>>()
+            .map(Some)
     }
 
     /// Reads the words of a part's primitive map.

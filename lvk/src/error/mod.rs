@@ -283,7 +283,7 @@ pub enum Error {
     /// Host memory is exhausted.
     #[error("out of host memory in {call} for '{}'", readable_name(object))]
     OutOfHostMemory {
-        /// The Vulkan command that failed.
+        /// The Vulkan command that failed, or the call of the library that lacks memory for its result.
         call: &'static str,
         /// Debug name of the object of the call.
         object: String,

@@ -314,6 +314,13 @@ impl Buffer {
         true
     }
 
+    /// Returns bytes of mapped memory. The range must have been checked. `call` is named where the host lacks memory for them.
+    pub(crate) fn read_bytes(&self, call: &'static str, offset: u64, size: u64) -> Result<Vec<u8>> {
+        let mut bytes = zeroed_bytes(call, &self.name, size)?;
+        self.read(offset, &mut bytes);
+        Ok(bytes)
+    }
+
     /// Reads mapped memory. Returns `false` if the buffer is not mapped. The range must have been checked.
     pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> bool {
         let Some(start) = self.mapped().filter(|_| self.contains(offset, bytes.len())) else { return false };
@@ -324,6 +331,17 @@ impl Buffer {
         }
         true
     }
+}
+
+/// Returns bytes on the host for data of `object`, whose size the application chooses: a lack of memory is an error, and does not end the
+/// process.
+pub(crate) fn zeroed_bytes(call: &'static str, object: &str, size: u64) -> Result<Vec<u8>> {
+    let lacking = || Error::OutOfHostMemory { call, object: object.to_owned() };
+    let size = usize::try_from(size).map_err(|_| lacking())?;
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(size).map_err(|_| lacking())?;
+    bytes.resize(size, 0);
+    Ok(bytes)
 }
 
 impl Drop for Buffer {
@@ -391,4 +409,16 @@ fn check_shareable(gpu: &Gpu, desc: &BufferDesc<'_>, sharing: &Sharing) -> Resul
     }
     let found = found.external_memory_properties.external_memory_features;
     sharing.check(&format!("buffer '{}' with shared memory", desc.debug_name), found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_that_the_host_has_no_memory_for_are_an_error() {
+        let told = zeroed_bytes("Readback::wait", "water", 1 << 62).unwrap_err().to_string();
+        assert_eq!(told, "out of host memory in Readback::wait for 'water'");
+        assert_eq!(zeroed_bytes("Readback::wait", "water", 3).unwrap(), [0; 3]);
+    }
 }

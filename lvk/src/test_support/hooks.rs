@@ -71,6 +71,12 @@ pub fn before_next_command_buffer(hook: impl FnOnce() + 'static) {
     submit_hook::before_next_command_buffer(Box::new(hook));
 }
 
+/// Runs `hook` on this thread each time that [`Context::serialize_blas`] knows the sizes of a BLAS and has not copied it yet, in place of
+/// another thread; `None` ends that.
+pub fn before_serialize_copies(hook: Option<Box<dyn FnMut()>>) {
+    submit_hook::before_serialize_copies(hook);
+}
+
 /// Returns the number of submissions so far.
 pub fn submissions(ctx: &Context) -> u64 {
     ctx.device_state().submitter.value_count()

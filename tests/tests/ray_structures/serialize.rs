@@ -1,6 +1,10 @@
 //! Serialized BLASes: a loaded BLAS gives the hits of a built one, and unusable bytes are refused.
 
+use std::cell::Cell;
+use std::rc::Rc;
+
 use lvk::glam::{Affine3A, Vec3};
+use lvk::test_hooks::before_serialize_copies;
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BuildFlags, BuildMode, Compaction, Context, DeviceProfile,
     Error, GeometryFlags, GeometryTransform, Holder, IndexFormat, Indices, LoadedBlas, PrimitiveOrder,
@@ -102,6 +106,52 @@ fn reason(result: Result<Holder<AccelStructHandle>>) -> String {
         }
         other => unreachable!("the bytes are no good, but {other:?}"),
     }
+}
+
+/// Its sizes may be others after a build, so that the driver would write beyond the buffer.
+#[test]
+fn a_blas_that_is_built_while_it_is_serialised_is_serialised_anew() -> Result<()> {
+    for split in [false, true] {
+        let Some(ctx) = (if split { split_device() } else { device() }) else { return Ok(()) };
+        if !builds_device_accel_structs(&ctx) {
+            continue;
+        }
+        let mine = Mine::new(&ctx)?;
+        let desc = mine.desc(MOVING, PrimitiveOrder::Given);
+        let blas = Rc::new(ctx.create_blas(&desc)?);
+        let tries = Rc::new(Cell::new(0));
+        let build = |most: u32| {
+            let (ctx, blas, tries) = (Context::clone(&ctx), Rc::clone(&blas), Rc::clone(&tries));
+            tries.set(0);
+            before_serialize_copies(Some(Box::new(move || {
+                tries.set(tries.get() + 1);
+                if tries.get() > most {
+                    return;
+                }
+                let mode = if tries.get() % 2 == 0 { BuildMode::Rebuild } else { BuildMode::Refit };
+                let mut cmd = ctx.acquire_command_buffer().unwrap();
+                cmd.build_blas(&[**blas], mode).unwrap();
+                ctx.submit(cmd).unwrap();
+            })));
+        };
+        build(3);
+        let bytes = ctx.serialize_blas(**blas)?;
+        assert_eq!(tries.get(), 4, "three tries are in vain");
+        build(u32::MAX);
+        let objects = ctx.live_objects();
+        let refused = ctx.serialize_blas(**blas);
+        before_serialize_copies(None);
+        let Err(Error::InvalidUsage { object, message }) = refused else {
+            unreachable!("it is built all the time, but {refused:?}")
+        };
+        assert!(object == "mine" && message.contains("between two builds"), "{object}: {message}");
+        ctx.wait_idle()?;
+        assert_eq!(ctx.live_objects(), objects);
+        drop(blas);
+        let loaded = load(&ctx, &desc, &bytes)?;
+        HitCheck::new(&ctx)?.scene("built meanwhile", &mine.tlas_of(&ctx, &loaded)?, &mine.scene)?;
+    }
+    Ok(())
 }
 
 /// Whole, in another order, split; compacted or not; and what was loaded, once more.

@@ -2,11 +2,8 @@
 
 use lvk_tests::subprocess::output_of_subprocess;
 
-use super::run::{Report, Soak};
+use super::run::{HOUR, Report, Soak};
 use super::scene::CYCLE;
-
-/// An hour at 60 frames a second.
-const HOUR: u32 = 216_000;
 
 /// Actions that every run must have done, as a loop that does nothing is flat as well.
 const ACTIONS: [&str; 25] = [

@@ -19,12 +19,9 @@ const RUST_HEAP_RISE: i64 = 16 << 10;
 /// Most that the C heap grows from the middle third to the last one, in thousandths.
 const C_HEAP_SLOPE: i64 = 20;
 
-/// The same of resident memory, which has the fragments and the arenas of the C library in it: a thread that the driver starts late takes a
-/// few megabytes once.
-const RESIDENT_SLOPE: i64 = 50;
-
 /// Counts everything, with the GPU idle. With `validation`, whose layer keeps memory of its own, the memory of the process is only reported.
-pub fn sample(ctx: &Context, validation: bool) -> Result<Vec<Quantity>> {
+/// `resident_slope`: as [`C_HEAP_SLOPE`], of resident memory.
+pub fn sample(ctx: &Context, validation: bool, resident_slope: i64) -> Result<Vec<Quantity>> {
     ctx.wait_idle()?;
     let slope = |most| if validation { Rule::Reported } else { Rule::Slope(most) };
     let threads = settled_threads();
@@ -34,7 +31,7 @@ pub fn sample(ctx: &Context, validation: bool) -> Result<Vec<Quantity>> {
     let process = [
         ("process: file descriptors", Rule::Exact, file_descriptor_count()),
         ("process: bytes of Rust's heap", Rule::Rise(RUST_HEAP_RISE), i64::try_from(rust_heap).ok()),
-        ("process: resident bytes", slope(RESIDENT_SLOPE), resident_bytes()),
+        ("process: resident bytes", slope(resident_slope), resident_bytes()),
         ("process: bytes of the C heap", slope(C_HEAP_SLOPE), heap_bytes()),
     ];
     // A count that the system does not have is no quantity.

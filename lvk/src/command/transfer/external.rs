@@ -1,11 +1,14 @@
 //! Exchange of buffers and textures in shared memory with other devices, processes and APIs.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
+use crate::resource::Texture;
 use crate::submit::emit_barriers::Side;
 use crate::submit::exchanged_layout::exchanged_layout;
 use crate::submit::last_access::QueueAccess;
@@ -45,9 +48,10 @@ impl CommandBuffer {
         texture: TextureHandle,
         layout: vk::ImageLayout,
     ) -> Result<()> {
-        self.check_shared_texture(texture)?;
-        self.release_texture(texture, layout)?;
-        self.record_texture_exchange(texture, layout, Side::Release)
+        let found = self.find_shared_texture(texture)?;
+        self.release_texture_object(&found, layout)?;
+        self.record_texture_exchange(&found, layout, Side::Release);
+        Ok(())
     }
 
     /// Acquires a texture in shared memory, which the other side released in the given layout, as
@@ -68,8 +72,7 @@ impl CommandBuffer {
         layout: vk::ImageLayout,
     ) -> Result<()> {
         self.needs_graphics("the acquisition of a texture")?;
-        self.check_shared_texture(texture)?;
-        let found = self.shared.store.textures.get(texture)?;
+        let found = self.find_shared_texture(texture)?;
         let known = exchanged_layout(layout, found.image.format, found.image.usage)
             .map_err(|why| Error::usage(&found.name, why))?;
         self.shared.submitter.import_texture(found.image.id, found.image.shape, known);
@@ -79,13 +82,14 @@ impl CommandBuffer {
         self.make_visible();
         self.use_texture(&found, found.range, Use::transfer_read().with_layout(known))?;
         self.flush_barriers();
-        self.record_texture_exchange(texture, layout, Side::Acquire)
+        self.record_texture_exchange(&found, layout, Side::Acquire);
+        Ok(())
     }
 
-    fn check_shared_texture(&self, texture: TextureHandle) -> Result<()> {
+    fn find_shared_texture(&self, texture: TextureHandle) -> Result<Arc<Texture>> {
         let texture = self.shared.store.textures.get(texture)?;
         if texture.image.shared_memory().is_some() {
-            return Ok(());
+            return Ok(texture);
         }
         let message = "the texture has no shared memory; create it by create_exportable_texture or \
                        import_texture_memory";
@@ -93,13 +97,7 @@ impl CommandBuffer {
     }
 
     /// Records the ownership transfer of a texture that is in the layout.
-    fn record_texture_exchange(
-        &mut self,
-        texture: TextureHandle,
-        layout: vk::ImageLayout,
-        side: Side,
-    ) -> Result<()> {
-        let texture = self.shared.store.textures.get(texture)?;
+    fn record_texture_exchange(&mut self, texture: &Texture, layout: vk::ImageLayout, side: Side) {
         let image = &texture.image;
         let [from, to] = self.families(side, image.is_concurrent());
         let scope = side.scope();
@@ -115,7 +113,6 @@ impl CommandBuffer {
             .image(image.raw)
             .subresource_range(image.barrier_image().range(image.shape.all_subresources()))];
         self.record_exchange(&vk::DependencyInfo::default().image_memory_barriers(&barrier));
-        Ok(())
     }
 
     fn exchange_buffer(&mut self, buffer: BufferHandle, side: Side) -> Result<()> {

@@ -1,11 +1,14 @@
 //! Releases textures to another engine in a given layout.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
+use crate::resource::Texture;
 use crate::submit::exchanged_layout::exchanged_layout;
 use crate::submit::last_access::QueueAccess;
 
@@ -19,6 +22,15 @@ impl CommandBuffer {
     /// texture rules out.
     pub fn release_texture(&mut self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.shared.store.textures.get(texture)?;
+        self.release_texture_object(&texture, layout)
+    }
+
+    /// As [`release_texture`](Self::release_texture).
+    pub(super) fn release_texture_object(
+        &mut self,
+        texture: &Arc<Texture>,
+        layout: vk::ImageLayout,
+    ) -> Result<()> {
         let image = &texture.image;
         let known = exchanged_layout(layout, image.format, image.usage)
             .map_err(|why| Error::usage(&texture.name, why))?;
@@ -27,7 +39,7 @@ impl CommandBuffer {
         }
         // Otherwise the end of the recording would transition a texture that a copy used to its default layout.
         self.make_visible();
-        self.use_texture(&texture, texture.range, Use::transfer_read().with_layout(known))?;
+        self.use_texture(texture, texture.range, Use::transfer_read().with_layout(known))?;
         self.flush_barriers();
         // The other engine may write the texture, so it waits for reads on other queues.
         self.reference_resource(texture.image.id, QueueAccess::Write);

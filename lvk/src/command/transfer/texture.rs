@@ -27,8 +27,8 @@ impl CommandBuffer {
         let target = self.shared.store.textures.get(target)?;
         let region = check_packed(&source, offset, &target, region)?;
         self.check_copy(&target, &region)?;
-        self.use_buffer(&source, Use::transfer_read());
         self.use_texture(&target, region.subresources(), Use::transfer_write())?;
+        self.use_buffer(&source, Use::transfer_read());
         self.flush_barriers();
         self.record_fill_texture(source.raw, offset, &target, &region);
         self.state.pending_visibility.push(PendingVisibility::Texture(target));

@@ -235,16 +235,36 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Returns the accesses whose images are written, or changed by atomic operations.
+/// Returns the accesses whose images are written, or changed by atomic operations, by functions that they are passed to as well.
 fn find_written_accesses(body: &[u32]) -> Result<HashSet<u32>, String> {
-    let (mut loaded_from, mut written) = (HashMap::new(), HashSet::new());
+    // Of values and parameters: those that they come from.
+    let mut sources: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut parameters: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut calls = Vec::new();
+    let (mut function, mut open) = (0, Vec::new());
     for instruction in instructions(body) {
-        let instruction = instruction?;
-        match instruction.op {
-            Some(Op::Load) => _ = loaded_from.insert(instruction.operand(1), instruction.operand(2)),
-            Some(Op::ImageWrite) => written.extend(loaded_from.get(&instruction.operand(0))),
-            Some(Op::ImageTexelPointer) => _ = written.insert(instruction.operand(2)),
+        let i = instruction?;
+        match i.op {
+            Some(Op::Load | Op::CopyObject) => sources.entry(i.operand(1)).or_default().push(i.operand(2)),
+            Some(Op::Function) => function = i.operand(1),
+            Some(Op::FunctionParameter) => parameters.entry(function).or_default().push(i.operand(1)),
+            Some(Op::FunctionCall) => calls.push(i.operands()),
+            Some(Op::ImageWrite) => open.push(i.operand(0)),
+            Some(Op::ImageTexelPointer) => open.push(i.operand(2)),
             _ => {}
+        }
+    }
+    for call in calls {
+        let [_, _, callee, arguments @ ..] = call else { continue };
+        let of_callee = parameters.get(callee).map_or(&[][..], Vec::as_slice);
+        for (parameter, argument) in of_callee.iter().zip(arguments) {
+            sources.entry(*parameter).or_default().push(*argument);
+        }
+    }
+    let mut written = HashSet::new();
+    while let Some(id) = open.pop() {
+        if written.insert(id) {
+            open.extend(sources.get(&id).into_iter().flatten());
         }
     }
     Ok(written)
@@ -330,6 +350,28 @@ mod tests {
             (before.bindings, before.push_constant_bytes),
             (after.bindings, after.push_constant_bytes)
         );
+    }
+
+    /// What a function writes, is written by its callers, through further functions too.
+    #[test]
+    fn images_that_functions_write_are_written() {
+        let text = "
+            layout(local_size_x = 1) in;
+            layout(push_constant, scalar) uniform Push { uint a; uint b; uint c; };
+            LVK_STORAGE_IMAGES_U2D(r32ui, kCounts);
+            void put(writeonly image2D image, vec4 color) { imageStore(image, ivec2(0), color); }
+            void putTwice(writeonly image2D image) { put(image, vec4(1)); put(image, vec4(2)); }
+            uint count(layout(r32ui) uimage2D image) { return imageAtomicAdd(image, ivec2(0), 1u); }
+            ivec2 sizeOf(layout(r32ui) readonly uimage2D image) { return imageSize(image); }
+            void main() {
+                putTwice(kImages2D[a]);
+                uint found = count(kCounts[b]);
+                if (sizeOf(kCounts[c]).x > found) put(kImages2D[c], vec4(0));
+            }";
+        let words = compiled(ShaderStage::Compute, text);
+        let mut found = calls(&with_checked_indices(&words, &plan()).unwrap());
+        found.sort_unstable();
+        assert_eq!(found, [[2, 0], [2, 1], [2, 1], [2, 1]]);
     }
 
     #[test]
