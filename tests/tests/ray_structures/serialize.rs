@@ -108,7 +108,7 @@ fn reason(result: Result<Holder<AccelStructHandle>>) -> String {
     }
 }
 
-/// Its sizes may be others after a build, so that the driver would write beyond the buffer.
+/// The sizes may be others after a build, so that the driver would write beyond the buffer.
 #[test]
 fn a_blas_that_is_built_while_it_is_serialised_is_serialised_anew() -> Result<()> {
     for split in [false, true] {

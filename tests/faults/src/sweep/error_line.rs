@@ -132,8 +132,11 @@ mod tests {
         let extensions = ["vkCreateBuffer", "vkEnumerateDeviceExtensionProperties"];
         assert_eq!(judged("vkCreateBuffer", memory, Span::Stays, &extensions, device), None);
         let gone = "error: swapchain 'main': its window is gone";
-        assert_eq!(named("vkQueuePresentKHR", FaultError::SurfaceLost, gone), None);
-        assert_eq!(named("vkQueuePresentKHR", memory, gone), Some(Flaw::UnnamedCommand(gone.to_owned())));
+        let unnamed = Some(Flaw::UnnamedCommand(gone.to_owned()));
+        assert_eq!(named("vkQueuePresentKHR", FaultError::SurfaceLost, gone), unnamed);
+        let found = "error: swapchain 'main': its window is gone (vkQueuePresentKHR failed for 'main': lost)";
+        assert_eq!(named("vkQueuePresentKHR", FaultError::SurfaceLost, found), None);
+        assert_eq!(named("vkQueuePresentKHR", memory, found), Some(Flaw::OtherCause(found.to_owned())));
     }
 
     #[test]
