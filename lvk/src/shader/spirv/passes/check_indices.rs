@@ -358,13 +358,12 @@ mod tests {
         let text = "
             layout(local_size_x = 1) in;
             layout(push_constant, scalar) uniform Push { uint a; uint b; uint c; };
-            LVK_STORAGE_IMAGES_U2D(r32ui, kCounts);
             void put(writeonly image2D image, vec4 color) { imageStore(image, ivec2(0), color); }
             void putTwice(writeonly image2D image) { put(image, vec4(1)); put(image, vec4(2)); }
-            ivec2 sizeOf(readonly uimage2D image) { return imageSize(image); }
+            ivec2 sizeOf(writeonly image2D image) { return imageSize(image); }
             void main() {
                 putTwice(kImages2D[a]);
-                if (sizeOf(kCounts[b]).x > 1) put(kImages2D[c], vec4(0));
+                if (sizeOf(kImages2D[b]).x > 1) put(kImages2D[c], vec4(0));
             }";
         let words = compiled(ShaderStage::Compute, text);
         let mut found = calls(&with_checked_indices(&words, &plan()).unwrap());
