@@ -26,7 +26,7 @@ const uint kPlaneMatteAlbedo = 14u;
 const uint kPlaneMirroredShare = 15u;
 const uint kPlaneBase = 16u; // light that needs no filter
 const uint kPlaneFrame = 17u; // the picture of this frame
-const uint kPlaneBefore = 18u; // where the point that the pixel shows was in the frame before
+const uint kPlaneBefore = 18u; // where the point that the pixel shows was in the frame before, and how far its surface has turned since
 const uint kPlaneShown = 19u;
 
 uint pixelPlace(ivec2 pixel) {

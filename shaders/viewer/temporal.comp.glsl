@@ -15,6 +15,7 @@ const float kLeastTurnFrames = 2.0;
 // half side.
 const float kMostChangedFrames = 3.0;
 const float kMostErrors = 2.5;
+const float kLeastChange = 0.03; // of the light
 const int kNearbyPixels = 2;
 // While it stands.
 const float kMostStillFrames = 65536.0;
@@ -24,14 +25,11 @@ const float kFirstFrames = 4.0;
 const float kLeastShare = 0.05;
 // Of the angle between normals of one surface.
 const float kLeastCosine = 0.8;
-// Of a surface that moves, over its distance from the eye.
-const float kLeastMotion = 1e-5;
 
 struct History {
     vec4 matte;
     vec4 mirrored;
     vec4 moments;
-    vec3 normal; // of the surface in the frame before
 };
 
 bool isSameSurface(Seen seen, vec3 point, Seen before, ivec2 pixel) {
@@ -77,15 +75,16 @@ Nearby nearbyLight(ivec2 pixel, ivec2 before, Seen seen) {
     return nearby;
 }
 
-// True for matte and mirrored light that has changed: the mean around a pixel differs by more than noise does.
+// True for matte and mirrored light that has changed: the mean around a pixel differs by more than noise and rounding do.
 bvec2 hasChanged(Nearby nearby) {
     float count = max(nearby.count, 1.0);
     vec2 mean = nearby.sum / count;
+    vec2 before = nearby.before / count;
     vec2 error = sqrt(max(nearby.squares / count - mean * mean, 0.0) / count);
-    return greaterThan(abs(mean - nearby.before / count), kMostErrors * error);
+    return greaterThan(abs(mean - before), max(kMostErrors * error, kLeastChange * max(mean, before)));
 }
 
-const History kNoHistory = History(vec4(0.0), vec4(0.0), vec4(0.0), vec3(0.0));
+const History kNoHistory = History(vec4(0.0), vec4(0.0), vec4(0.0));
 
 // Adds the history of a pixel that saw the same surface, which was at `point`. Returns its weight, or 0.
 float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 point) {
@@ -94,11 +93,9 @@ float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 p
         return 0.0;
     }
     uint from = pixelPlace(pixel);
-    Seen before = unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]);
-    if (!isSameSurface(seen, point, before, pixel)) {
+    if (!isSameSurface(seen, point, unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]), pixel)) {
         return 0.0;
     }
-    sum.normal += weight * before.normal;
     sum.matte += weight * frame.planes.at[previousPlane(kPlaneMatteHistory, from)];
     sum.mirrored += weight * frame.planes.at[previousPlane(kPlaneMirroredHistory, from)];
     sum.moments += weight * frame.planes.at[previousPlane(kPlaneMoments, from)];
@@ -126,7 +123,7 @@ History historyAt(vec2 place, Seen seen, vec3 point) {
         }
     }
     float inverse = total > 0.0 ? 1.0 / total : 0.0;
-    return History(sum.matte * inverse, sum.mirrored * inverse, sum.moments * inverse, sum.normal * inverse);
+    return History(sum.matte * inverse, sum.mirrored * inverse, sum.moments * inverse);
 }
 
 // A mean with one more number, of which it holds `most` at most; the last component counts them.
@@ -141,11 +138,6 @@ float framesOfHighlight(Seen seen, vec3 point, vec3 pointBefore) {
     return seen.roughness * seen.roughness / max(length(turned), 1e-6);
 }
 
-// Frames in which a surface turns so little that its light stays.
-float framesOfTurn(vec3 normal, vec3 before) {
-    return kMostTurn / max(length(normal - before), 1e-6);
-}
-
 void temporalPixel(uvec2 at) {
     ivec2 pixel = ivec2(at);
     uint place = pixelPlace(pixel);
@@ -154,15 +146,15 @@ void temporalPixel(uvec2 at) {
     vec3 mirrored = frame.planes.at[planePlace(kPlaneMirrored, place)].rgb;
     History history = kNoHistory;
     vec3 point = seenPoint(frame.camera, pixel, seen.distance);
-    vec3 before = frame.planes.at[planePlace(kPlaneBefore, place)].xyz;
+    vec4 beforeAndTurn = frame.planes.at[planePlace(kPlaneBefore, place)];
+    vec3 before = beforeAndTurn.xyz;
     float matteFrames = frame.sceneMoves != 0u ? kMostMovingFrames : kMostFrames;
     float mirrorFrames = clamp(framesOfHighlight(seen, point, before), kLeastMirrorFrames, matteFrames);
     if (frame.frameNumber > 0u && !isSky(seen)) {
         vec2 from = vec2(pixel) + 0.5 - motionOf(point, before);
         history = historyAt(from, seen, before);
         if (frame.sceneMoves != 0u && history.matte.a > 0.0) {
-            bool hasMoved = distance(point, before) > kLeastMotion * seen.distance;
-            float turnFrames = hasMoved ? max(framesOfTurn(seen.normal, history.normal), kLeastTurnFrames) : kMostFrames;
+            float turnFrames = max(kMostTurn / max(beforeAndTurn.w, 1e-6), kLeastTurnFrames);
             bvec2 changed = hasChanged(nearbyLight(pixel, ivec2(floor(from)), seen));
             matteFrames = min(matteFrames, changed.x ? min(turnFrames, kMostChangedFrames) : turnFrames);
             mirrorFrames = min(mirrorFrames, changed.y ? min(turnFrames, kMostChangedFrames) : turnFrames);

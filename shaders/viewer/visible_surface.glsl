@@ -30,19 +30,27 @@ Hit visibleHit(uint place, vec3 direction) {
     return Hit(visible.x, visible.y, visible.z, barycentrics, distance);
 }
 
-// Where the surface at `point` was in the frame before.
-vec3 pointBefore(Hit hit, vec3 point) {
-    Geometry geometry = frame.geometries.at[frame.instances.at[hit.instance].firstGeometry + hit.geometry];
-    uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
-    vec3 weights = weightsOf(hit.barycentrics);
-    vec3 now = vec3(0.0);
-    vec3 before = vec3(0.0);
-    for (uint corner = 0u; corner < 3u; ++corner) {
-        now += weights[corner] * positionIn(geometry.positions, geometry.flags, corners[corner]);
-        before += weights[corner] * positionIn(geometry.positionsBefore, geometry.flags, corners[corner]);
+// Where the surface at `point` was in the frame before, and by how many radians its triangle has turned since.
+vec4 pointBefore(Hit hit, vec3 point) {
+    if (frame.sceneMoves == 0u) {
+        return vec4(point, 0.0);
     }
-    vec3 way = transformed(frame.rowsBefore.at[hit.instance], before) - transformed(frame.instances.at[hit.instance].rows, now);
-    return frame.sceneMoves != 0u ? point + way : point;
+    Instance instance = frame.instances.at[hit.instance];
+    Geometry geometry = frame.geometries.at[instance.firstGeometry + hit.geometry];
+    uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
+    vec3 now[3];
+    vec3 before[3];
+    for (uint corner = 0u; corner < 3u; ++corner) {
+        now[corner] = transformed(instance.rows, positionIn(geometry.positions, geometry.flags, corners[corner]));
+        before[corner] = transformed(frame.rowsBefore.at[hit.instance], positionIn(geometry.positionsBefore, geometry.flags, corners[corner]));
+    }
+    vec3 weights = weightsOf(hit.barycentrics);
+    vec3 way = weights.x * (before[0] - now[0]) + weights.y * (before[1] - now[1]) + weights.z * (before[2] - now[2]);
+    vec3 normal = cross(now[1] - now[0], now[2] - now[0]);
+    vec3 normalBefore = cross(before[1] - before[0], before[2] - before[0]);
+    float scale = length(normal) * length(normalBefore);
+    float turn = scale > 0.0 ? asin(min(length(cross(normal, normalBefore)) / scale, 1.0)) : 0.0;
+    return vec4(point + way, turn);
 }
 
 // What later passes need of a pixel, beside its light.
@@ -53,8 +61,8 @@ void storeSurface(uint place, Seen seen, vec3 base, vec3 matteAlbedo, vec3 share
     frame.planes.at[planePlace(kPlaneMirroredShare, place)] = vec4(share, 0.0);
 }
 
-void storePoint(uint place, vec3 point) {
-    frame.planes.at[planePlace(kPlaneBefore, place)] = vec4(point, 0.0);
+void storePoint(uint place, vec4 pointAndTurn) {
+    frame.planes.at[planePlace(kPlaneBefore, place)] = pointAndTurn;
 }
 
 // The same of a surface with its layers.
@@ -66,7 +74,7 @@ void storeLayers(uint place, Seen seen, Surface surface, Bsdf bsdf) {
 
 // The same of the sky.
 void storeSky(uint place, vec3 direction) {
-    storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
+    storePoint(place, vec4(frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction, 0.0));
     storeSurface(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), vec3(0.0), vec3(0.0));
 }
 

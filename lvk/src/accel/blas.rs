@@ -158,12 +158,6 @@ impl Blas {
         self.lock_state().builds
     }
 
-    /// Numbers of builds, and of refits since the last of them, that were submitted so far: they differ where contents may.
-    pub(crate) fn version(&self) -> [u64; 2] {
-        let state = self.lock_state();
-        [state.builds, state.refits.into()]
-    }
-
     /// True if recorded builds wait for their submission.
     pub(crate) fn has_open_builds(&self) -> bool {
         self.lock_state().open_builds > 0

@@ -260,7 +260,7 @@ impl<'a> BlobReader<'a> {
     }
 }
 
-fn encoded_bytes(blob: &BlasFile) -> usize {
+pub(crate) fn encoded_bytes(blob: &BlasFile) -> usize {
     let part =
         |part: &BlasFilePart| 16 + part.driver.len() + part.map.as_ref().map_or(0, |map| 4 * map.len());
     HEADER_BYTES

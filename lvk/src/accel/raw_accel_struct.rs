@@ -13,6 +13,8 @@ pub(crate) struct RawAccelStruct {
     pub(crate) raw: vk::AccelerationStructureKHR,
     /// Device address, for instances.
     pub(crate) address: u64,
+    /// Bytes that it was created with. Its memory may be more.
+    pub(crate) bytes: u64,
     storage: StorageRange,
     ext: ash::khr::acceleration_structure::Device,
 }
@@ -40,7 +42,7 @@ impl RawAccelStruct {
         let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw);
         // SAFETY: the acceleration structure is alive.
         let address = unsafe { ext.get_acceleration_structure_device_address(&info) };
-        Ok(Self { raw, address, storage, ext })
+        Ok(Self { raw, address, bytes, storage, ext })
     }
 
     /// Bytes of its memory.

@@ -76,6 +76,28 @@ impl CommandBuffer {
         Ok(())
     }
 
+    /// Copies every part as it is (`vkCmdCopyAccelerationStructureKHR`).
+    pub(crate) fn clone_structures(
+        &mut self,
+        target: &AccelStruct,
+        from: &BlasStructures,
+        to: &BlasStructures,
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let ext = shared.gpu.accel_functions()?;
+        self.use_copied_accel_struct(target);
+        self.flush_barriers();
+        for (source, copy) in from.structures.iter().zip(&to.structures) {
+            let info = vk::CopyAccelerationStructureInfoKHR::default()
+                .src(source.raw)
+                .dst(copy.raw)
+                .mode(vk::CopyAccelerationStructureModeKHR::CLONE);
+            // SAFETY: the source is built, and the copy has its size.
+            unsafe { ext.cmd_copy_acceleration_structure(self.raw(), &info) };
+        }
+        Ok(())
+    }
+
     /// Serializes each of `structures`, parts of `target`, to its address, a multiple of 256 in `buffer`
     /// (`vkCmdCopyAccelerationStructureToMemoryKHR`).
     pub(crate) fn serialize_parts(

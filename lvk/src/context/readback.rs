@@ -15,7 +15,7 @@ use crate::resource::region::TextureRegion;
 use crate::submit::SubmitHandle;
 
 /// Name, in errors, of the buffers that readbacks copy into.
-pub(super) const READBACK: &str = "readback";
+pub(crate) const READBACK: &str = "readback";
 
 /// Bytes that the GPU copies to the host, from [`Context::read_buffer_later`] and [`Context::read_texture_later`].
 ///
@@ -27,6 +27,8 @@ pub struct Readback {
     target: Option<Arc<Buffer>>,
     submission: SubmitHandle,
     ctx: Context,
+    /// Debug name of the object that is read.
+    owner: String,
 }
 
 impl Readback {
@@ -39,7 +41,8 @@ impl Readback {
     pub fn wait(&self) -> Result<Vec<u8>> {
         self.ctx.wait(self.submission)?;
         let read = |target: &Arc<Buffer>| target.read_bytes("Readback::wait", 0, target.size_bytes);
-        self.target.as_ref().map_or_else(|| Ok(Vec::new()), read)
+        let bytes = self.target.as_ref().map_or_else(|| Ok(Vec::new()), read);
+        bytes.map_err(|error| error.with_owner(READBACK, &self.owner))
     }
 
     /// Returns the submission that copies the bytes.
@@ -76,11 +79,11 @@ impl Context {
             return Err(Error::reversed_range(&found.name, "bytes", &range));
         };
         found.check_range(range.start, size)?;
+        let owner = found.name.clone();
         drop(found);
         let copy = BufferCopy { source_offset: range.start, target_offset: 0, size };
-        self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy])).map_err(
-            |error| if let Ok(found) = find() { error.with_owner(READBACK, &found.name) } else { error },
-        )
+        let read = self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]));
+        read_of(owner, read)
     }
 
     /// Starts a copy of texels to the host, tightly packed, row by row and layer by layer, after everything submitted
@@ -90,11 +93,12 @@ impl Context {
     /// As [`download_texture`](Self::download_texture).
     pub fn read_texture_later(&self, texture: TextureHandle, region: &TextureRegion) -> Result<Readback> {
         let find = || self.device_state().store.textures.get(texture);
-        let size = find()?.resolve_region(region)?.bytes();
-        self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&find()?, region, target, 0))
-            .map_err(
-                |error| if let Ok(found) = find() { error.with_owner(READBACK, &found.name) } else { error },
-            )
+        let found = find()?;
+        let (size, owner) = (found.resolve_region(region)?.bytes(), found.name.clone());
+        drop(found);
+        let read = self
+            .read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&find()?, region, target, 0));
+        read_of(owner, read)
     }
 
     /// Creates a buffer that the GPU copies into for the host.
@@ -119,7 +123,7 @@ impl Context {
     ) -> Result<Readback> {
         if size == 0 {
             let submission = SubmitHandle::default();
-            return Ok(Readback { target: None, submission, ctx: self.clone() });
+            return Ok(Readback { target: None, submission, ctx: self.clone(), owner: String::new() });
         }
         let target = self.readback_buffer(size)?;
         let mut cmd = self.acquire_command_buffer()?;
@@ -127,6 +131,14 @@ impl Context {
         // Before the submission: if that fails half-way, the GPU may still write the buffer.
         self.device_state().free_later(DeferredObject::Buffer(Arc::clone(&target)));
         let submission = self.submit(cmd)?;
-        Ok(Readback { target: Some(target), submission, ctx: self.clone() })
+        Ok(Readback { target: Some(target), submission, ctx: self.clone(), owner: String::new() })
+    }
+}
+
+/// Names the object that is read, for errors of the call and of the readback.
+fn read_of(owner: String, read: Result<Readback>) -> Result<Readback> {
+    match read {
+        Ok(readback) => Ok(Readback { owner, ..readback }),
+        Err(error) => Err(error.with_owner(READBACK, &owner)),
     }
 }

@@ -13,7 +13,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::{BlasPart, BlasStructures};
 use crate::accel::blas_file::{
     BlasFile, BlasFileGeometry, BlasFileGeometryKind, BlasFileIndices, BlasFilePart, decode_blas_file,
-    encode_blas_file,
+    encode_blas_file, encoded_bytes,
 };
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::BuildFlags;
@@ -26,7 +26,7 @@ use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::format::IndexFormat;
 use crate::handle::AccelStructHandle;
-use crate::resource::buffer::{BufferDesc, InternalUsage};
+use crate::resource::buffer::{BufferDesc, InternalUsage, check_host_memory, zeroed_bytes};
 use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::{Buffer, QueryPool};
 
@@ -34,9 +34,6 @@ use crate::resource::{Buffer, QueryPool};
 const ALIGNMENT: u64 = 256;
 /// Maximum bytes of parts that share one buffer, because devices limit buffer sizes. A larger part has a buffer alone.
 const MAX_GROUP_BYTES: u64 = 256 << 20;
-
-/// Times that a BLAS is serialised while other threads build it.
-const MOST_TRIES: u32 = 8;
 
 /// Result of [`Context::load_or_create_blas`].
 pub struct LoadedBlas {
@@ -54,9 +51,11 @@ impl Context {
     ///
     /// Keep the file where only the program writes to it: its checksum detects damage, not manipulation.
     ///
+    /// The bytes are of one state of the BLAS, also if another thread builds it meanwhile: the GPU copies it first, so its memory is taken twice
+    /// for a while.
+    ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a TLAS, for a BLAS with opacity micromaps, and for one that other threads build again and again
-    /// meanwhile; [`StaleHandle`](Error::StaleHandle).
+    /// [`InvalidUsage`](Error::InvalidUsage) for a TLAS and for a BLAS with opacity micromaps; [`StaleHandle`](Error::StaleHandle).
     pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
         let object = self.device_state().store.accel_structs.get(handle)?;
         let blas = object.blas()?;
@@ -69,7 +68,7 @@ impl Context {
             let bytes = self.read_software_bytes(blas);
             let driver = bytes.map_err(|error| error.with_owner(READBACK, &object.name))?;
             let parts = vec![BlasFilePart { driver, map: None }];
-            return Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }));
+            return encode(&object, geometries, parts);
         }
         let drivers = self.serialize_parts(&object)?;
         let mut parts = Vec::with_capacity(drivers.len());
@@ -78,7 +77,7 @@ impl Context {
                 self.read_primitive_map(shape).map_err(|error| error.with_owner(READBACK, &object.name))?;
             parts.push(BlasFilePart { driver, map });
         }
-        Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }))
+        encode(&object, geometries, parts)
     }
 
     /// Creates a BLAS from the bytes of [`serialize_blas`](Self::serialize_blas)
@@ -135,36 +134,40 @@ impl Context {
         }
     }
 
-    /// Returns the driver's data of each part. Begins again where another thread submits a build meanwhile, of which the sizes may be others.
-    fn serialize_parts(&self, object: &AccelStruct) -> Result<Vec<Vec<u8>>> {
-        for _ in 0..MOST_TRIES {
-            if let Some(parts) = self.try_to_serialize(object)? {
-                return Ok(parts);
-            }
-        }
-        let message = "other threads build it all the time; serialise it between two builds";
-        Err(Error::usage(&object.name, message))
-    }
-
-    /// Returns the driver's data of each part, or `None` where a build was submitted meanwhile.
-    fn try_to_serialize(&self, object: &AccelStruct) -> Result<Option<Vec<Vec<u8>>>> {
-        let mut all = Vec::new();
-        // The first build may not be submitted yet.
-        self.flush()?;
-        let version = object.blas()?.version();
-        let body = object.blas()?.structures();
+    /// Returns the driver's data of each part, all of one state of the BLAS.
+    fn serialize_parts(&self, object: &Arc<AccelStruct>) -> Result<Vec<Vec<u8>>> {
+        let body = self.clone_structures(object)?;
         let sizes = self.serialized_sizes(object, &body)?;
         #[cfg(any(test, feature = "test-hooks"))]
         crate::test_support::submit_hook::run_serialize_hook();
+        let mut all = Vec::with_capacity(sizes.len());
         for group in group_by_bytes(&sizes, self.max_group_bytes()) {
             let sizes = &sizes[group.clone()];
-            let bytes = self.serialize_group(object, version, (&body, group), sizes);
-            let Some(bytes) = bytes.map_err(|error| error.with_owner(READBACK, &object.name))? else {
-                return Ok(None);
-            };
-            all.extend(bytes);
+            let bytes = self.serialize_group(object, &body, group, sizes);
+            all.extend(bytes.map_err(|error| error.with_owner(READBACK, &object.name))?);
         }
-        Ok(Some(all))
+        Ok(all)
+    }
+
+    /// Copies the structures (`vkCmdCopyAccelerationStructureKHR`). Other threads may build the BLAS until the driver's data are read, and a
+    /// build may change their size. The copy goes ahead of all later submissions.
+    fn clone_structures(&self, object: &Arc<AccelStruct>) -> Result<Arc<BlasStructures>> {
+        let (shared, blas) = (self.device_state(), object.blas()?);
+        let (from, to) = self.record_in_prologue(|cmd| {
+            let from = blas.structures();
+            let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
+            let copy = |part: &RawAccelStruct| {
+                RawAccelStruct::new(&shared.gpu, &shared.accel_storage, &object.name, ty, part.bytes)
+            };
+            let structures = from.structures.iter().map(copy).collect::<Result<Vec<_>>>()?;
+            let to = Arc::new(BlasStructures { structures, compacted_from: None, rebuildable: false });
+            cmd.clone_structures(object, &from, &to)?;
+            Ok((from, to))
+        })?;
+        for used in [from, Arc::clone(&to)] {
+            shared.free_later(DeferredObject::BlasStorage(used));
+        }
+        Ok(to)
     }
 
     fn serialized_sizes(&self, object: &AccelStruct, body: &Arc<BlasStructures>) -> Result<Vec<u64>> {
@@ -182,44 +185,35 @@ impl Context {
         sizes.ok_or_else(|| Error::usage(&object.name, "the device returned no size for a serialised BLAS"))
     }
 
-    /// Serialises parts that share one buffer. `None` if builds were submitted since `version`: the prologue, which cannot be submitted while
-    /// the version is compared, runs before all later ones.
+    /// Serialises parts that share one buffer.
     fn serialize_group(
         &self,
         object: &AccelStruct,
-        version: [u64; 2],
-        (body, group): (&Arc<BlasStructures>, Range<usize>),
+        body: &Arc<BlasStructures>,
+        group: Range<usize>,
         sizes: &[u64],
-    ) -> Result<Option<Vec<Vec<u8>>>> {
-        let (shared, blas) = (self.device_state(), object.blas()?);
+    ) -> Result<Vec<Vec<u8>>> {
         let places = AlignedOffsets::new(sizes);
         let buffer = self.blob_buffer(&object.name, places.total)?;
-        let target = self.readback_buffer(places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
-        let copy = BufferCopy { source_offset: base - buffer.address, target_offset: 0, size: places.total };
-        let recorded = self.record_in_prologue(|cmd| {
-            if blas.version() != version {
-                return Ok(false);
-            }
+        let mut bytes = zeroed_bytes("serialize_blas", &object.name, places.total)?;
+        self.read_back(places.total, &mut bytes, |cmd, target| {
+            self.device_state().free_later(DeferredObject::Buffer(Arc::clone(&buffer)));
+            self.device_state().free_later(DeferredObject::BlasStorage(Arc::clone(body)));
             cmd.serialize_parts(object, &body.structures[group], &buffer, &addresses)?;
-            cmd.copy_buffer_objects(&buffer, &target, &[copy])?;
-            Ok(true)
-        });
-        // A compaction may replace the structures while the copy is under way.
-        shared.free_later(DeferredObject::BlasStorage(Arc::clone(body)));
-        for used in [buffer, Arc::clone(&target)] {
-            shared.free_later(DeferredObject::Buffer(used));
-        }
-        if !recorded? {
-            return Ok(None);
-        }
-        self.wait(self.flush()?)?;
-        let parts = places.offsets.iter().zip(sizes);
-        parts
-            .map(|(offset, size)| target.read_bytes("serialize_blas", *offset, *size))
-            .collect::<Result<_>>()
-            .map(Some)
+            cmd.copy_buffer_objects(
+                &buffer,
+                target,
+                &[BufferCopy { source_offset: base - buffer.address, target_offset: 0, size: places.total }],
+            )
+        })?;
+        let part = |(offset, size): (&u64, &u64)| -> Result<Vec<u8>> {
+            let mut part = zeroed_bytes("serialize_blas", &object.name, *size)?;
+            part.copy_from_slice(&bytes[*offset as usize..][..*size as usize]);
+            Ok(part)
+        };
+        places.offsets.iter().zip(sizes).map(part).collect()
     }
 
     /// Reads the words of a part's primitive map.
@@ -227,6 +221,7 @@ impl Context {
         let Some(map) = &shape.map else { return Ok(None) };
         let ranges = &shape.input.ranges;
         let count = ranges.iter().map(|range| range.primitive_count as usize).sum::<usize>();
+        check_host_memory("serialize_blas", READBACK, 4 * (ranges.len() + count))?;
         let mut words = vec![0_u32; ranges.len() + count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
         let size = bytes.len() as u64;
@@ -362,6 +357,17 @@ impl Context {
         }
         Ok(BlasInputs { transforms, parts })
     }
+}
+
+/// Returns the bytes of a file with these parts of a BLAS.
+fn encode(
+    object: &AccelStruct,
+    geometries: Vec<BlasFileGeometry>,
+    parts: Vec<BlasFilePart>,
+) -> Result<Vec<u8>> {
+    let file = BlasFile { flags: object.flags.bits(), geometries, parts };
+    check_host_memory("serialize_blas", &object.name, encoded_bytes(&file))?;
+    Ok(encode_blas_file(&file))
 }
 
 /// Returns the size in bytes of the acceleration structure that the driver's header states. Returns `None` for a header

@@ -196,6 +196,8 @@ impl Context {
     ///
     /// # Errors
     /// Those of [`create_swapchain`](Self::create_swapchain); the swapchain is then suspended.
+    /// [`InvalidUsage`](Error::InvalidUsage) if its former surface still has the window, because views of its images or command
+    /// buffers keep that.
     /// [`StaleHandle`](Error::StaleHandle).
     pub fn resume_swapchain(
         &self,
@@ -237,7 +239,8 @@ impl Context {
     /// # Errors
     /// [`StaleHandle`](Error::StaleHandle); [`Unsupported`](Error::Unsupported) if a recreated swapchain would have no
     /// images, because the window supports none of the formats; [`InvalidUsage`](Error::InvalidUsage) while it is
-    /// suspended, because its properties follow from its window.
+    /// suspended, because its properties follow from its window, and if the window is in use;
+    /// [`SurfaceLost`](Error::SurfaceLost) if it is gone.
     pub fn swapchain_info(&self, swapchain: SwapchainHandle) -> Result<SwapchainInfo> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
@@ -326,8 +329,7 @@ impl PresentBackend for LiveBackend<'_> {
     }
 
     fn create_surface(&mut self) -> Result<(), Failure> {
-        let created = self.surface().map(drop);
-        created.map_err(|failure| self.explain(failure))
+        self.surface().map(drop)
     }
 
     fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
@@ -395,8 +397,9 @@ impl LiveBackend<'_> {
         if let Some(surface) = &self.resources.surface {
             return Ok(Arc::clone(surface));
         }
-        let surface = Arc::new(Surface::new(&self.resources.gpu, &self.resources.window, self.name)?);
-        Ok(Arc::clone(self.resources.surface.insert(surface)))
+        let created = Surface::new(&self.resources.gpu, &self.resources.window, self.name);
+        let surface = created.map_err(|error| self.explain(error.into()))?;
+        Ok(Arc::clone(self.resources.surface.insert(Arc::new(surface))))
     }
 
     /// Returns the supported present modes, and the creation parameters of the Vulkan swapchain.

@@ -338,10 +338,15 @@ impl Buffer {
 pub(crate) fn zeroed_bytes(call: &'static str, object: &str, size: u64) -> Result<Vec<u8>> {
     let lacking = || Error::OutOfHostMemory { call, object: object.to_owned() };
     let size = usize::try_from(size).map_err(|_| lacking())?;
-    let mut bytes = Vec::new();
-    bytes.try_reserve_exact(size).map_err(|_| lacking())?;
-    bytes.resize(size, 0);
-    Ok(bytes)
+    check_host_memory(call, object, size)?;
+    // Zeros cost nothing here, which a list that grows would write.
+    Ok(vec![0; size])
+}
+
+/// Fails unless the host has memory for so many bytes of `object`: an allocation that fails right behind would end the process.
+pub(crate) fn check_host_memory(call: &'static str, object: &str, size: usize) -> Result<()> {
+    let reserved = Vec::<u8>::new().try_reserve_exact(size);
+    reserved.map_err(|_| Error::OutOfHostMemory { call, object: object.to_owned() })
 }
 
 impl Drop for Buffer {

@@ -17,10 +17,12 @@ use crate::context::Context;
 use crate::context::holder::Holder;
 use crate::context::plan_blas::{BlasInputs, convert_geometries, new_blas_object};
 use crate::context::read_bounds::geometry_bytes;
+use crate::context::readback::READBACK;
 use crate::device_state::{DeferredObject, DeviceState};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::lock_order::HeldLocks;
+use crate::resource::buffer::zeroed_bytes;
 use crate::software_ray_query::blas::{
     BvhOrigin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan, storage_bytes,
 };
@@ -105,7 +107,7 @@ impl Context {
         let Some(software) = &blas.software else { return Ok(Vec::new()) };
         let body = software.moved_storage().unwrap_or(&software.storage);
         let (shared, size) = (self.device_state(), body.memory_bytes());
-        let mut bytes = vec![0; SOFTWARE_BLOB_UUID.len() + size as usize];
+        let mut bytes = zeroed_bytes("serialize_blas", READBACK, SOFTWARE_BLOB_UUID.len() as u64 + size)?;
         bytes[..SOFTWARE_BLOB_UUID.len()].copy_from_slice(&SOFTWARE_BLOB_UUID);
         self.read_back(size, &mut bytes[SOFTWARE_BLOB_UUID.len()..], |cmd, target| {
             shared.free_later(DeferredObject::SoftwareStorage(Arc::clone(body)));

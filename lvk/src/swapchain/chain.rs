@@ -194,15 +194,20 @@ impl PresentSync {
         unsafe { self.gpu.device.reset_fences(&[fence]) }.map_err(Error::vulkan("vkResetFences", &self.name))
     }
 
+    /// True if the presentation engine may use the objects: without a fence, until a submission has waited for an image that came back.
+    fn is_in_use(&self) -> bool {
+        self.presented || self.came_back && self.present_fence.is_none()
+    }
+
     /// True if the completion of the last present is known or can be queried.
     pub(crate) fn reports_completion(&self) -> bool {
-        !self.presented || self.present_fence.is_some()
+        !self.is_in_use() || self.present_fence.is_some()
     }
 
     /// Returns true if nothing uses the objects when the timeline has reached `completed`; `None` if the device cannot
     /// tell.
     pub(crate) fn is_done(&self, completed: u64) -> Result<Option<bool>> {
-        if !self.presented {
+        if !self.is_in_use() {
             // A present that failed leaves the semaphore to the submission before it.
             return Ok(Some(self.drawn_at <= completed));
         }

@@ -50,13 +50,14 @@ static LAST_SKY: Mutex<Option<BakedSky>> = Mutex::new(None);
 
 /// The texels of a sky as half floats, face by face.
 fn baked_sky(sky: &Sky, size: u32) -> Arc<[u16]> {
-    let mut last = LAST_SKY.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, _, texels)) = last.as_ref().filter(|(of, edge, _)| of == sky && *edge == size) {
+    let last = || LAST_SKY.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, _, texels)) = last().as_ref().filter(|(of, edge, _)| of == sky && *edge == size) {
         return Arc::clone(texels);
     }
+    // Without the lock: another renderer may bake another sky.
     let faces = sky.bake_cube(size);
     let texels: Arc<[u16]> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
-    *last = Some((*sky, size, Arc::clone(&texels)));
+    *last() = Some((*sky, size, Arc::clone(&texels)));
     texels
 }
 
