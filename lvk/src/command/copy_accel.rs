@@ -58,18 +58,7 @@ impl CommandBuffer {
         from: &BlasStructures,
         to: &BlasStructures,
     ) -> Result<()> {
-        let shared = Arc::clone(&self.shared);
-        let ext = shared.gpu.accel_functions()?;
-        self.use_copied_accel_struct(target);
-        self.flush_barriers();
-        for (source, copy) in from.structures.iter().zip(&to.structures) {
-            let info = vk::CopyAccelerationStructureInfoKHR::default()
-                .src(source.raw)
-                .dst(copy.raw)
-                .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
-            // SAFETY: the source was built with compaction allowed, and the copy has the size that the GPU returned.
-            unsafe { ext.cmd_copy_acceleration_structure(self.raw(), &info) };
-        }
+        self.copy_structures(target, from, to, vk::CopyAccelerationStructureModeKHR::COMPACT)?;
         if !may_be_rebuilt(target, to) {
             self.free_build_inputs(target)?;
         }
@@ -83,16 +72,25 @@ impl CommandBuffer {
         from: &BlasStructures,
         to: &BlasStructures,
     ) -> Result<()> {
+        self.copy_structures(target, from, to, vk::CopyAccelerationStructureModeKHR::CLONE)
+    }
+
+    fn copy_structures(
+        &mut self,
+        target: &AccelStruct,
+        from: &BlasStructures,
+        to: &BlasStructures,
+        mode: vk::CopyAccelerationStructureModeKHR,
+    ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let ext = shared.gpu.accel_functions()?;
         self.use_copied_accel_struct(target);
         self.flush_barriers();
         for (source, copy) in from.structures.iter().zip(&to.structures) {
-            let info = vk::CopyAccelerationStructureInfoKHR::default()
-                .src(source.raw)
-                .dst(copy.raw)
-                .mode(vk::CopyAccelerationStructureModeKHR::CLONE);
-            // SAFETY: the source is built, and the copy has its size.
+            let info =
+                vk::CopyAccelerationStructureInfoKHR::default().src(source.raw).dst(copy.raw).mode(mode);
+            // SAFETY: the source is built. To compact it, it was built so that it may be, and the copy has the size that the GPU returned;
+            // a clone has the size of the source.
             unsafe { ext.cmd_copy_acceleration_structure(self.raw(), &info) };
         }
         Ok(())

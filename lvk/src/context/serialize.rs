@@ -21,6 +21,7 @@ use crate::accel::geometry::{BlasGeometry, GeometryFlags};
 use crate::accel::primitive_map::{covers_mesh, decode_table};
 use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::accel::split::PartPlan;
+use crate::accel::storage::AccelStorage;
 use crate::command::transfer::BufferCopy;
 use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
@@ -52,7 +53,7 @@ impl Context {
     /// Keep the file where only the program writes to it: its checksum detects damage, not manipulation.
     ///
     /// The bytes are of one state of the BLAS, also if another thread builds it meanwhile: the GPU copies it first, so its memory is taken twice
-    /// for a while.
+    /// for a while, beside [`ContextDesc::accel_budget_bytes`](crate::ContextDesc::accel_budget_bytes).
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a TLAS and for a BLAS with opacity micromaps; [`StaleHandle`](Error::StaleHandle).
@@ -153,11 +154,13 @@ impl Context {
     /// build may change their size. The copy goes ahead of all later submissions.
     fn clone_structures(&self, object: &Arc<AccelStruct>) -> Result<Arc<BlasStructures>> {
         let (shared, blas) = (self.device_state(), object.blas()?);
+        // The copy is gone soon, and so does not count against the budget of the application.
+        let storage = AccelStorage::new(u64::MAX);
         let (from, to) = self.record_in_prologue(|cmd| {
             let from = blas.structures();
             let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
             let copy = |part: &RawAccelStruct| {
-                RawAccelStruct::new(&shared.gpu, &shared.accel_storage, &object.name, ty, part.bytes)
+                RawAccelStruct::new(&shared.gpu, &storage, &object.name, ty, part.bytes)
             };
             let structures = from.structures.iter().map(copy).collect::<Result<Vec<_>>>()?;
             let to = Arc::new(BlasStructures { structures, compacted_from: None, rebuildable: false });

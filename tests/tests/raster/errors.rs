@@ -280,11 +280,14 @@ fn stages_must_pass_on_what_the_next_stage_reads() {
     let vec3 = "layout(location = 1) in vec3 a;";
     create("layout(location = 1) out vec3 a;", vec3).unwrap();
     create("layout(location = 1) out vec4 a;", vec3).unwrap();
+    // Two outputs are the words of one input.
+    let halves = "layout(location = 1, component = 2) out vec2 b; layout(location = 1) out vec2 a;";
+    create(halves, "layout(location = 1) in vec4 a;").unwrap();
     let start = "surface: fragment shader 'test shader' reads 3 32-bit floats at location 1, component 0 ('a'), but \
                  vertex shader 'test shader' before it";
     for (outputs, words) in [
-        ("layout(location = 1) out vec2 a;", "has 2 32-bit floats"),
-        ("layout(location = 1) flat out ivec3 a;", "has 3 32-bit integers"),
+        ("layout(location = 1) out vec2 a;", "has 2 32-bit floats at location 1, component 0"),
+        ("layout(location = 1) flat out ivec3 a;", "has 3 32-bit integers at location 1, component 0"),
         ("layout(location = 2) out vec3 a;", "writes nothing there"),
     ] {
         usage_error(create(outputs, vec3), &format!("{start} {words}; declare the output like the input"));
