@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::Buffer;
-use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage, zeroed_bytes};
 use crate::resource::region::TextureRegion;
 use crate::submit::SubmitHandle;
 
@@ -39,10 +39,11 @@ impl Readback {
 
     /// Returns the bytes. Waits for the GPU if they are not available yet (`vkWaitSemaphores`).
     pub fn wait(&self) -> Result<Vec<u8>> {
-        self.ctx.wait(self.submission)?;
-        let read = |target: &Arc<Buffer>| target.read_bytes("Readback::wait", 0, target.size_bytes);
-        let bytes = self.target.as_ref().map_or_else(|| Ok(Vec::new()), read);
-        bytes.map_err(|error| error.with_owner(READBACK, &self.owner))
+        let size = self.target.as_ref().map_or(0, |target| target.size_bytes);
+        let mut bytes = zeroed_bytes("Readback::wait", READBACK, size)
+            .map_err(|error| error.with_owner(READBACK, &self.owner))?;
+        self.wait_into(&mut bytes)?;
+        Ok(bytes)
     }
 
     /// Returns the submission that copies the bytes.

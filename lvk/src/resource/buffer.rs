@@ -314,13 +314,6 @@ impl Buffer {
         true
     }
 
-    /// Returns bytes of mapped memory. The range must have been checked. `call` is named where the host lacks memory for them.
-    pub(crate) fn read_bytes(&self, call: &'static str, offset: u64, size: u64) -> Result<Vec<u8>> {
-        let mut bytes = zeroed_bytes(call, &self.name, size)?;
-        self.read(offset, &mut bytes);
-        Ok(bytes)
-    }
-
     /// Reads mapped memory. Returns `false` if the buffer is not mapped. The range must have been checked.
     pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> bool {
         let Some(start) = self.mapped().filter(|_| self.contains(offset, bytes.len())) else { return false };

@@ -63,7 +63,7 @@ impl From<Error> for Failure {
     }
 }
 
-/// What keeps a surface, and the remedy.
+/// Text of an error about a surface that something keeps: the objects that may keep the surface, and the remedy.
 const KEPT: &str = "views of its images, or command buffers that were not submitted, keep its surface; drop them before its \
                     window goes or has another surface";
 

@@ -239,8 +239,8 @@ impl SwapchainResources {
 
     /// True if command buffers or views keep a surface of the present window that was released.
     pub(crate) fn is_window_kept(&self) -> bool {
-        let surfaces = self.released.iter().filter_map(Weak::upgrade);
-        surfaces.into_iter().any(|surface| is_same_window(surface.window.as_ref(), self.window.as_ref()))
+        let mut surfaces = self.released.iter().filter_map(Weak::upgrade);
+        surfaces.any(|surface| is_same_window(surface.window.as_ref(), self.window.as_ref()))
     }
 
     /// Destroys all replaced swapchains, and the surface if nothing else keeps it. Their presents are finished or

@@ -9,8 +9,8 @@ use crate::fault::{Fault, FaultError, Span};
 
 /// Judges the line of an error: it must name a command that has failed, behind it the object of that command, and the cause.
 ///
-/// Two other forms count: the swapchain that stays out of date; and what needs ray tracing on a device that was created without. Every command concerns an object, those before the device the loader,
-/// the instance or the window.
+/// Two other forms count: the swapchain that stays out of date; and what needs ray tracing on a device that was created without.
+/// Every command concerns an object, those before the device the loader, the instance or the window.
 pub(super) fn judge_error(
     error: &str,
     fault: &Fault,

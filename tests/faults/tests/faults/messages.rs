@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use lvk_faults::sweep::clean_program::CleanProgram;
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::run::{Program, fault_layer, run};
 use lvk_faults::sweep::verdict::{Ending, Flaw, RunOutcome, flaws};
@@ -9,6 +10,12 @@ use lvk_faults::sweep::verdict::{Ending, Flaw, RunOutcome, flaws};
 use crate::{
     assert_reached, assert_told, assert_validated, clean, error_line, in_window, program, validated,
 };
+
+/// Fails unless the fault is reached without a flaw, and the line of its error has the expected words.
+fn assert_tells(program: &CleanProgram, fault: &str, expected: &str) {
+    let outcome = assert_reached(program, fault);
+    assert!(error_line(&outcome).contains(expected), "{fault}: {}", outcome.stderr);
+}
 
 /// Faults that a whole sweep found once (docs/defects.md).
 #[test]
@@ -50,10 +57,7 @@ fn semaphores_of_windows_outlive_their_work() {
     let Some((_connection, _display, program)) = in_window(validated("another_window")) else { return };
     let program = clean(program);
     assert_validated(&program);
-    let told = |fault: &str, expected: &str| {
-        let outcome = assert_reached(&program, fault);
-        assert!(error_line(&outcome).contains(expected), "{fault}: {}", outcome.stderr);
-    };
+    let told = |fault: &str, expected: &str| assert_tells(&program, fault, expected);
     told("vkQueuePresentKHR 1 host-memory once", "out of host memory in vkQueuePresentKHR for 'swapchain of");
     told("vkCreateSwapchainKHR 2 device-lost once", "lost in vkCreateSwapchainKHR for 'swapchain of");
     // The suspension waits for a present. Later calls of it find the device lost too.
@@ -77,10 +81,7 @@ fn a_window_in_use_tells_what_has_it() {
     let Some((_connection, _display, program)) = in_window(validated("kept_surface")) else { return };
     let program = clean(program);
     assert_validated(&program);
-    let told = |fault: &str, expected: &str| {
-        let outcome = assert_reached(&program, fault);
-        assert!(error_line(&outcome).contains(expected), "{fault}: {}", outcome.stderr);
-    };
+    let told = |fault: &str, expected: &str| assert_tells(&program, fault, expected);
     let in_use = "swapchain of the scenario: its window has another swapchain";
     let kept = "swapchain of the scenario: its window has its former surface";
     // The context has a surface first, while it chooses a device.

@@ -352,7 +352,7 @@ mod tests {
         );
     }
 
-    /// What a function writes, is written by its callers, through further functions too.
+    /// An image that a function writes counts as written by the callers of the function, through further functions too.
     #[test]
     fn images_that_functions_write_are_written() {
         let text = "
