@@ -75,25 +75,43 @@ pub(crate) struct CompactedSizeQuery {
     pub(crate) pool: QueryPool,
     /// Each BLAS with the query index of its first part. The queries of its other parts follow.
     pub(crate) targets: Vec<(Arc<AccelStruct>, u32)>,
-    /// For each target, the number of builds before the query; empty before the submission.
-    builds: Mutex<Vec<u64>>,
+    /// The submission of the query; `None` before it.
+    submission: Mutex<Option<QuerySubmission>>,
+}
+
+/// What is known when a query is submitted.
+#[derive(Clone)]
+struct QuerySubmission {
+    /// Timeline value at which the results are there.
+    value: u64,
+    /// For each target, the number of builds before the query.
+    builds: Vec<u64>,
 }
 
 impl CompactedSizeQuery {
     pub(crate) fn new(pool: QueryPool, targets: Vec<(Arc<AccelStruct>, u32)>) -> Self {
-        Self { pool, targets, builds: Mutex::new(Rank::SizeQuery, Vec::new()) }
+        Self { pool, targets, submission: Mutex::new(Rank::SizeQuery, None) }
     }
 
-    /// Records that the query was submitted after all builds submitted so far.
-    pub(crate) fn mark_submitted(&self) {
+    /// Records that the query was submitted with this timeline value, after all builds submitted so far.
+    pub(crate) fn mark_submitted(&self, value: u64) {
         let builds =
             |(target, _): &(Arc<AccelStruct>, u32)| target.blas().map_or(0, |blas| blas.build_count());
-        *self.builds.lock() = self.targets.iter().map(builds).collect();
+        let builds = self.targets.iter().map(builds).collect();
+        *self.submission.lock() = Some(QuerySubmission { value, builds });
     }
 
-    /// Returns the copies to record; `None` until the GPU has written the results.
-    pub(crate) fn results(&self) -> Result<Option<Vec<PlannedCopy>>> {
-        let Some(builds) = self.build_counts() else { return Ok(None) };
+    /// Returns the copies to record; `None` until the GPU has written the results. Before its submission is done, which
+    /// `is_done` tells by the value, the pool is not reset either, and may answer anything.
+    pub(crate) fn results(
+        &self,
+        is_done: impl FnOnce(u64) -> Result<bool>,
+    ) -> Result<Option<Vec<PlannedCopy>>> {
+        let submission = self.submission.lock().clone();
+        let Some(QuerySubmission { value, builds }) = submission else { return Ok(None) };
+        if !is_done(value)? {
+            return Ok(None);
+        }
         let sizes: Option<Vec<_>> = self.pool.values(0, self.pool.count)?.into_iter().collect();
         let Some(sizes) = sizes else { return Ok(None) };
         let copy = |((target, first), builds): (&(Arc<AccelStruct>, u32), u64)| {
@@ -102,12 +120,6 @@ impl CompactedSizeQuery {
             Ok(PlannedCopy { target, sizes, builds, refused: None })
         };
         self.targets.iter().zip(builds).map(copy).collect::<Result<_>>().map(Some)
-    }
-
-    /// For each target, the number of builds before the query; `None` before the submission.
-    fn build_counts(&self) -> Option<Vec<u64>> {
-        let builds = self.builds.lock();
-        (builds.len() == self.targets.len()).then(|| builds.clone())
     }
 }
 

@@ -61,7 +61,7 @@ impl RecordingState {
             shared.apply_tlas_updates(updates, |target| target.mark_used_by_submission(value));
         }
         self.open_builds.drain(..).for_each(|build| build.mark_submitted(value));
-        self.size_queries.drain(..).for_each(|query| query.mark_submitted());
+        self.size_queries.drain(..).for_each(|query| query.mark_submitted(value));
         self.queries.apply_submission();
     }
 

@@ -100,11 +100,16 @@ impl CommandRing {
         self.queues[recording.queue_index].in_flight.push_back(recording);
     }
 
-    /// Takes back a command buffer that was not submitted.
-    pub(crate) fn discard(&mut self, recording: Box<Recording>) {
+    /// Takes back a command buffer whose submission failed.
+    pub(crate) fn take_back(&mut self, recording: Box<Recording>) {
+        self.forget(&recording);
+        self.queues[recording.queue_index].free.push(recording);
+    }
+
+    /// Forgets a command buffer that was never submitted.
+    pub(crate) fn forget(&mut self, recording: &Recording) {
         self.end_recording(recording.sequence);
         self.discarded.extend(recording.is_staged.then_some(recording.sequence));
-        self.queues[recording.queue_index].free.push(recording);
     }
 
     /// Takes back command buffers that the queues have finished. Returns the sequence numbers of finished and discarded

@@ -162,9 +162,11 @@ impl<T> Submitter<T> {
         ticket.begin(&self.gpu).inspect_err(|_| self.lock().ring.end_recording(sequence))
     }
 
-    /// Discards a command buffer.
+    /// Destroys a command buffer that was not submitted. To record it anew is not enough: NVIDIA's driver 580 then runs the last
+    /// copy that it held.
     pub(crate) fn discard(&self, recording: Box<Recording>) {
-        self.lock().ring.discard(recording);
+        self.lock().ring.forget(&recording);
+        recording.destroy(&self.gpu);
     }
 
     /// Restricts a resource to the graphics queue from now on.
@@ -558,7 +560,7 @@ impl<T> SubmitterState<T> {
     fn file_recording(&mut self, recording: Box<Recording>) -> u64 {
         let value = recording.value;
         match value {
-            0 => self.ring.discard(recording),
+            0 => self.ring.take_back(recording),
             _ => self.ring.mark_submitted(recording),
         }
         value

@@ -25,6 +25,12 @@ pub fn null_command_context(desc: &ContextDesc<'_>) -> Result<Context> {
     with_null_commands(|| Context::new(desc))
 }
 
+/// Runs `make`. The queues of contexts that it creates run late and side by side, in an order that `seed` and chance decide, as far as
+/// submissions do not wait for each other. Queues that share a Vulkan queue need [`QueueRequest::Emulated`](crate::QueueRequest::Emulated).
+pub fn with_unordered_queues<T>(seed: u64, make: impl FnOnce() -> T) -> T {
+    crate::test_support::unordered_queues::with_unordered_queues(seed, make)
+}
+
 /// Returns the number of live parts that graphics pipelines are linked from.
 pub fn graphics_part_count(ctx: &Context) -> usize {
     ctx.device_state().graphics_parts.count()

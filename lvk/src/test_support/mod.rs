@@ -18,5 +18,6 @@ pub(crate) mod scattered_bounds;
 #[cfg(feature = "software-ray-query")]
 pub(crate) mod software_ray_query;
 pub(crate) mod submit_hook;
+pub(crate) mod unordered_queues;
 #[cfg(feature = "window")]
 pub(crate) mod window;

@@ -1,7 +1,7 @@
 //! Submission: waiting, polling, and frames in flight.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use lvk::{Dependencies, Error, Format, SubmitHandle, TextureDesc, TextureUsage};
+use lvk::{Dependencies, Error, Format, Queue, SubmitHandle, TextureDesc, TextureUsage};
 use lvk_tests::compute::{busy_pipeline, read_words, words_buffer};
 use lvk_tests::{device, device_with};
 
@@ -45,6 +45,27 @@ fn flushing_runs_uploads_and_is_idle_without_any() {
     assert!(flushed > idle);
     ctx.wait(flushed).unwrap();
     assert_eq!(read_words(&ctx, *buffer, 4), [3; 4]);
+}
+
+/// The next command buffer of the queue may be the same one of Vulkan. NVIDIA's driver 580 runs the last copy of one that is reset while it
+/// is recorded.
+#[test]
+fn a_dropped_command_buffer_leaves_nothing_to_the_next() {
+    let Some(ctx) = device() else { return };
+    let (buffer, other) = (words_buffer(&ctx, &[7; 4]), words_buffer(&ctx, &[9; 4]));
+    for queue in Queue::ALL {
+        for command in 0..3 {
+            let mut dropped = ctx.acquire_command_buffer_on(queue).unwrap();
+            match command {
+                0 => dropped.update_buffer(*buffer, 0, &[1; 8]).unwrap(),
+                1 => dropped.copy_buffer(*other, 0, *buffer, 0, 16).unwrap(),
+                _ => dropped.fill_buffer(*buffer, 0, 16, 3).unwrap(),
+            }
+            drop(dropped);
+            ctx.submit(ctx.acquire_command_buffer_on(queue).unwrap()).unwrap();
+            assert_eq!(read_words(&ctx, *buffer, 4), [7; 4], "{queue:?}, command {command}");
+        }
+    }
 }
 
 #[test]

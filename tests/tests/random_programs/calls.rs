@@ -18,7 +18,7 @@ pub(super) type Outcome = Result<bool, String>;
 /// Most live objects of a kind.
 pub(super) const MOST: usize = 12;
 /// Most readbacks that are not finished.
-const MOST_PENDING: usize = 6;
+pub(super) const MOST_PENDING: usize = 6;
 
 impl World<'_> {
     pub(super) fn create_buffer(&mut self, n: [u16; 6]) -> Outcome {

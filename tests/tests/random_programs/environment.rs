@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use lvk::test_hooks::with_unordered_queues;
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context,
     Holder, QueryPoolDesc, QueryPoolHandle, QueueRequest, RayTracingPipelineHandle, SubmitHandle,
@@ -12,6 +13,21 @@ use lvk_tests::device_with;
 use super::kit::{Kit, ray_pipeline};
 use super::memory::Effect;
 use super::op::Kind;
+use super::shared::Shared;
+
+/// The queues of a context.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Queues {
+    /// The device's own.
+    Own,
+    /// Three on one Vulkan queue.
+    Emulated,
+    /// As emulated ones, but late and side by side: what a submission does not wait for may run after it.
+    Unordered,
+}
+
+/// All kinds of queues.
+pub const QUEUES: [Queues; 3] = [Queues::Own, Queues::Emulated, Queues::Unordered];
 
 /// Objects of another context.
 pub struct Foreign {
@@ -77,6 +93,8 @@ impl Foreign {
 pub struct Environment {
     /// Pipelines.
     pub kit: Kit,
+    /// Objects that programs on several threads use at once.
+    pub shared: Shared,
     /// Objects of another context.
     pub foreign: Foreign,
     ctx: Context,
@@ -93,19 +111,28 @@ pub struct Environment {
 
 impl Environment {
     /// Creates both contexts. `None` as for [`lvk_tests::device`].
-    pub fn new(queues: QueueRequest) -> Option<Self> {
-        let (ctx, sink) = device_with(|desc| desc.queues = queues)?.into_context();
+    pub fn new(queues: Queues) -> Option<Self> {
+        let make = |queues| device_with(|desc| desc.queues = queues);
+        let made = match queues {
+            Queues::Own => make(QueueRequest::OwnHardware),
+            Queues::Emulated => make(QueueRequest::Emulated),
+            Queues::Unordered => with_unordered_queues(1, || make(QueueRequest::Emulated)),
+        };
+        let (ctx, sink) = made?.into_context();
         let (other, other_sink) = device_with(|_| {})?.into_context();
         let (ctx, other) = (ctx?, other?);
         let kit = Kit::new(&ctx);
         let foreign = Foreign::new(other);
-        let (Ok(kit), Ok(foreign)) = (kit, foreign) else { unreachable!("the set-up of the programs fails") };
+        let (Ok(kit), Ok(foreign), Ok(shared)) = (kit, foreign, Shared::new(&ctx)) else {
+            unreachable!("the set-up of the programs fails")
+        };
         let own_bytes = ctx.accel_memory().structure_bytes;
         let stale_queries = ctx.create_query_pool(&QueryPoolDesc::default()).ok()?.handle();
         Some(Self {
             own_bytes,
             stale_queries,
             kit,
+            shared,
             foreign,
             ctx,
             sinks: [sink, other_sink],
@@ -149,7 +176,7 @@ impl Environment {
     pub fn check_all_gone(&self) -> Result<(), String> {
         self.ctx.wait_idle().map_err(|error| error.to_string())?;
         let live = self.ctx.live_objects();
-        if live.len() != self.kit.object_count() {
+        if live.len() != self.kit.object_count() + Shared::COUNT {
             return Err(format!("objects are alive after the program: {live:?}"));
         }
         let bytes = self.ctx.accel_memory().structure_bytes;

@@ -4,9 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::environment::Environment;
+use super::environment::{Environment, QUEUES};
 use super::op::{Op, parse_program};
-use super::plan::QUEUES;
 use super::threads::{REPEATS, run_and_check};
 use super::watchdog::Watchdog;
 

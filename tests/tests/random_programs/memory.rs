@@ -2,6 +2,7 @@
 
 use super::cell::{Cell, known, pattern_byte};
 use super::image::{Image, Place, mip_extent, texel_bytes};
+use super::numbered::Numbered;
 use super::queries::{Pool, Queries, QueryResult};
 use lvk::Format;
 
@@ -18,9 +19,9 @@ pub const MISS: u32 = 0x7e7e_7e7e;
 #[derive(Debug, Default)]
 pub struct Memory {
     /// Bytes of the buffers.
-    pub buffers: Vec<Vec<Cell>>,
+    pub buffers: Numbered<Vec<Cell>>,
     /// Images.
-    pub images: Vec<Image>,
+    pub images: Numbered<Image>,
     /// Depth of each triangle of the meshes.
     pub meshes: Vec<Vec<u32>>,
     /// BLAS.

@@ -92,6 +92,21 @@ pub enum Kind {
     UpdateTlasFromBuffer,
     WrongStructure,
     ReloadBlas,
+    UploadShared,
+    DownloadShared,
+    ReplaceShared,
+    FillShared,
+    CopyToShared,
+    CopyFromShared,
+    DispatchToShared,
+    DispatchFromShared,
+    TexelsToShared,
+    TexelsFromShared,
+    StoreShared,
+    FetchShared,
+    BuildShared,
+    TraceShared,
+    UseReplaced,
 }
 
 /// Kinds that record a command, of which `RecordOnThreads` chooses. Kept programs need this table as it is: newer kinds
@@ -126,7 +141,7 @@ const RECORDED: [(Kind, u16); 25] = [
 
 /// Kinds that record a command, of which `RecordAnyOnThreads` chooses beside those of [`RECORDED`]. Traces are chosen more
 /// often than that table says, as few of them hit.
-const RECORDED_LATER: [(Kind, u16); 13] = [
+const RECORDED_LATER: [(Kind, u16); 25] = [
     (Kind::DrawIndexed, 4),
     (Kind::DrawIndirect, 4),
     (Kind::DrawCounted, 4),
@@ -140,10 +155,22 @@ const RECORDED_LATER: [(Kind, u16); 13] = [
     (Kind::WrongStructure, 1),
     (Kind::Trace, 6),
     (Kind::TraceRays, 3),
+    (Kind::FillShared, 2),
+    (Kind::CopyToShared, 2),
+    (Kind::CopyFromShared, 2),
+    (Kind::DispatchToShared, 2),
+    (Kind::DispatchFromShared, 2),
+    (Kind::TexelsToShared, 2),
+    (Kind::TexelsFromShared, 2),
+    (Kind::StoreShared, 2),
+    (Kind::FetchShared, 2),
+    (Kind::BuildShared, 2),
+    (Kind::TraceShared, 3),
+    (Kind::UseReplaced, 4),
 ];
 
 /// Calls of the context.
-const CALLED: [(Kind, u16); 47] = [
+const CALLED: [(Kind, u16); 50] = [
     (Kind::CreateBuffer, 4),
     (Kind::DestroyBuffer, 2),
     (Kind::UploadBuffer, 5),
@@ -190,7 +217,10 @@ const CALLED: [(Kind, u16); 47] = [
     (Kind::CreateVolume, 1),
     (Kind::ReadQueries, 3),
     (Kind::RecordAnyOnThreads, 1),
-    (Kind::ReloadBlas, 1),
+    (Kind::ReloadBlas, 2),
+    (Kind::UploadShared, 2),
+    (Kind::DownloadShared, 2),
+    (Kind::ReplaceShared, 1),
 ];
 
 /// An operation.
@@ -266,8 +296,9 @@ pub fn parse_program(text: &str) -> Result<Vec<Op>, String> {
 impl Kind {
     /// Returns the kinds that change what the model knows of the contents of an object.
     pub fn with_effect() -> Vec<Self> {
-        // Texts of labels, and a time that no query of the model has; a wrong structure is refused.
-        const NONE: [Kind; 3] = [Kind::Label, Kind::Timestamp, Kind::WrongStructure];
+        // Texts of labels, and a time that no query of the model has; a wrong structure is refused; the shared BLAS is built of
+        // the same triangles.
+        const NONE: [Kind; 4] = [Kind::Label, Kind::Timestamp, Kind::WrongStructure, Kind::BuildShared];
         let mut kinds = vec![
             Self::MapBuffer,
             Self::UploadBuffer,
@@ -277,6 +308,7 @@ impl Kind {
             Self::CreateBlasBatch,
             Self::ReloadBlas,
             Self::CreateTlas,
+            Self::UploadShared,
         ];
         for (kind, _) in RECORDED.iter().chain(&RECORDED_LATER) {
             if !NONE.contains(kind) && !kinds.contains(kind) {

@@ -1,6 +1,6 @@
 //! Plans of recorded commands: the call, the problems that it must report, and the effects that it has.
 
-use lvk::{Aspect, BufferCopy, CommandBuffer, Dependencies, Queue, QueueRequest, TextureRegion};
+use lvk::{Aspect, BufferCopy, CommandBuffer, Dependencies, Queue, TextureRegion};
 
 use super::cell::pattern;
 use super::environment::Environment;
@@ -8,7 +8,7 @@ use super::image::mip_extent;
 use super::kit::{Kernel, Push};
 use super::memory::{Effect, pattern_word};
 use super::op::{Kind, Op};
-use super::world::{Problem, World};
+use super::world::{Problem, World, judge};
 
 /// The call of a command.
 pub type Action = Box<dyn FnOnce(&Environment, &mut CommandBuffer) -> lvk::Result<()> + Send>;
@@ -19,6 +19,8 @@ pub struct Planned {
     pub action: Action,
     pub problems: Vec<Problem>,
     pub effects: Vec<Effect>,
+    /// Version of an object that the command uses and any thread may destroy.
+    pub replaced: Option<u64>,
 }
 
 impl Planned {
@@ -28,7 +30,19 @@ impl Planned {
         effects: Vec<Effect>,
         action: impl FnOnce(&Environment, &mut CommandBuffer) -> lvk::Result<()> + Send + 'static,
     ) -> Self {
-        Self { kind: Kind::Label, action: Box::new(action), problems, effects }
+        Self { kind: Kind::Label, action: Box::new(action), problems, effects, replaced: None }
+    }
+
+    /// Records the command. Returns the effects of one that succeeds, and `None` if it is refused as it must be. An object
+    /// that is gone before the call must be refused, one that is there behind the call must not.
+    pub fn run(mut self, env: &Environment, cmd: &mut CommandBuffer) -> Result<Option<Vec<Effect>>, String> {
+        let is_gone = || self.replaced.is_some_and(|version| !env.shared.is_current(version));
+        let was_gone = is_gone();
+        let outcome = (self.action)(env, cmd);
+        if was_gone || (outcome.is_err() && is_gone()) {
+            self.problems.push(Problem::Stale);
+        }
+        Ok(judge(outcome, &self.problems)?.map(|()| self.effects))
     }
 }
 
@@ -115,6 +129,18 @@ impl World<'_> {
             Kind::CountSamples => self.count_samples(n, at),
             Kind::UpdateTlasFromBuffer => self.update_tlas_from_buffer(n, at),
             Kind::WrongStructure => self.wrong_structure(n, queue),
+            Kind::FillShared => self.fill_shared(n),
+            Kind::CopyToShared => self.copy_shared(n, false),
+            Kind::CopyFromShared => self.copy_shared(n, true),
+            Kind::DispatchToShared => self.dispatch_to_shared(n, queue),
+            Kind::DispatchFromShared => self.dispatch_from_shared(n, queue),
+            Kind::TexelsToShared => self.copy_shared_texels(n, false),
+            Kind::TexelsFromShared => self.copy_shared_texels(n, true),
+            Kind::StoreShared => self.store_shared(n, queue),
+            Kind::FetchShared => self.fetch_shared(n, queue),
+            Kind::BuildShared => self.build_shared(at),
+            Kind::TraceShared => self.trace_shared(n, queue),
+            Kind::UseReplaced => self.use_replaced(n, queue),
             _ => Some(Planned::new(Vec::new(), Vec::new(), move |_, cmd| {
                 match n[0] % 3 {
                     0 => cmd.push_label("part"),
@@ -394,6 +420,3 @@ pub fn graphics_problems<const N: usize>(queue: Queue, others: [Option<Problem>;
     let wrong = (queue != Queue::Graphics).then_some(Problem::WrongQueue);
     others.into_iter().flatten().chain(wrong).collect()
 }
-
-/// The queues of contexts, for seeds.
-pub const QUEUES: [QueueRequest; 2] = [QueueRequest::OwnHardware, QueueRequest::Emulated];

@@ -224,6 +224,8 @@ impl World<'_> {
             return None;
         }
         pass.problems.extend(graphics_problems(queue, []));
+        let lacks_volumes = is_volume && !self.ctx().capabilities().resolves_to_volumes;
+        pass.problems.extend(lacks_volumes.then_some(Problem::Unsupported));
         pass.problems.extend(mistake.map(|_| Problem::Usage));
         let mut effects = Vec::new();
         if pass.problems.is_empty() {

@@ -103,6 +103,9 @@ impl World<'_> {
             Kind::CreateCube => self.create_solid(n, false),
             Kind::CreateVolume => self.create_solid(n, true),
             Kind::ReadQueries => self.read_queries(n),
+            Kind::UploadShared => self.upload_shared(n),
+            Kind::DownloadShared => self.download_shared(n),
+            Kind::ReplaceShared => self.replace_shared(),
             Kind::Wait => self.wait(n),
             Kind::IsDone => self.is_done(n),
             Kind::WaitIdle => self.wait_idle(),
@@ -135,6 +138,7 @@ impl World<'_> {
             tlas: HashMap::new(),
             blas: HashMap::new(),
             queries: OpenQueries::default(),
+            builds_shared: false,
         });
         Ok(())
     }
@@ -191,10 +195,10 @@ impl World<'_> {
     }
 
     /// True if the submission may be refused: software traces, and a BLAS of the commands was built since they were
-    /// recorded. It depends on the builder of the BLAS.
+    /// recorded, or may be built by another thread. It depends on the builder of the BLAS.
     fn is_overtaken(&self, open: &Open) -> bool {
-        builds_software_bvhs(self.ctx())
-            && open.blas.iter().any(|(blas, version)| self.memory.blas[*blas].version != *version)
+        let is_newer = |(blas, version): (&usize, &u32)| self.memory.blas[*blas].version != *version;
+        builds_software_bvhs(self.ctx()) && (open.builds_shared || open.blas.iter().any(is_newer))
     }
 
     fn drop_commands(&mut self, n: [u16; 6]) -> Result<bool, String> {
@@ -225,8 +229,8 @@ impl World<'_> {
             let threads = self.open.iter_mut().zip(plans).map(|(open, plans)| {
                 scope.spawn(move || {
                     for planned in plans {
-                        if judge((planned.action)(env, &mut open.cmd), &planned.problems)?.is_some() {
-                            open.effects.extend(planned.effects);
+                        if let Some(effects) = planned.run(env, &mut open.cmd)? {
+                            open.effects.extend(effects);
                         }
                     }
                     Ok(())

@@ -7,9 +7,8 @@ use std::time::Instant;
 
 use lvk_tests::subprocess::in_subprocess;
 
-use super::environment::Environment;
+use super::environment::{Environment, QUEUES, Queues};
 use super::op::{Kind, Op, program};
-use super::plan::QUEUES;
 use super::run::{Failure, run};
 use super::shrink::shrink;
 use super::threads::{TRIES, report, run_and_check};
@@ -30,7 +29,7 @@ const CHECKED_EVERY: u64 = 16;
 ///
 /// # Panics
 /// When one of them fails.
-fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &Watchdog) -> Option<Tally> {
+fn run_seeds(queues: Queues, seeds: impl Iterator<Item = u64>, dog: &Watchdog) -> Option<Tally> {
     let env = Environment::new(queues)?;
     let mut total = Tally::default();
     for (count, seed) in (1..).zip(seeds) {
@@ -57,7 +56,7 @@ fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &
 ///
 /// # Panics
 /// When one of them fails. It is shrunk together with those that ran beside it.
-fn run_on_threads(queues: lvk::QueueRequest, seeds: &[u64], threads: usize, dog: &Watchdog) -> Option<Tally> {
+fn run_on_threads(queues: Queues, seeds: &[u64], threads: usize, dog: &Watchdog) -> Option<Tally> {
     let env = Environment::new(queues)?;
     let (next, total) = (AtomicU64::new(0), Mutex::new(Tally::default()));
     let running: Vec<Mutex<Option<u64>>> = (0..threads).map(|_| Mutex::default()).collect();
@@ -127,7 +126,7 @@ fn is_supported(env: &Environment, kind: Kind) -> bool {
 }
 
 /// Returns what the bounded programs must have and do not: every kind without a problem, as far as the device has what it needs, and BLAS that
-/// calls and commands refuse, one by one and in lists.
+/// calls and commands refuse, one by one and in lists, and uses of shared objects that are gone.
 fn unseen(total: &Tally, env: &Environment) -> Vec<(Kind, Option<Problem>)> {
     const OF_BLAS: [Kind; 10] = [
         Kind::CreateTlas,
@@ -145,7 +144,9 @@ fn unseen(total: &Tally, env: &Environment) -> Vec<(Kind, Option<Problem>)> {
     let is_wanted = |kind: &Kind| *kind != Kind::WrongStructure && is_supported(env, *kind);
     let kinds = Kind::all().filter(is_wanted).map(|kind| (kind, None));
     let of_blas = |kind| [Problem::Stale, Problem::Foreign].map(|problem| (kind, Some(problem)));
-    kinds.chain(OF_BLAS.into_iter().flat_map(of_blas)).filter(|wanted| !total.seen.contains(wanted)).collect()
+    let of_replaced = (Kind::UseReplaced, Some(Problem::Stale));
+    let wanted = kinds.chain(OF_BLAS.into_iter().flat_map(of_blas)).chain([of_replaced]);
+    wanted.filter(|wanted| !total.seen.contains(wanted)).collect()
 }
 
 #[test]
@@ -169,7 +170,7 @@ fn random_programs_by_lowered_pipelines_do_what_the_model_says() {
     in_subprocess(random_programs_by_lowered_pipelines_do_what_the_model_says, &variables, || {
         Watchdog::watch(|dog| {
             let seeds = 2_000_000..2_000_000 + LOWERED_SEEDS;
-            let Some(total) = run_seeds(lvk::QueueRequest::OwnHardware, seeds, dog) else { return };
+            let Some(total) = run_seeds(Queues::Own, seeds, dog) else { return };
             assert!(total.hits > LOWERED_SEEDS, "rays are too rare");
             assert!(total.seen.contains(&(Kind::TraceRays, None)), "no pipeline is traced");
         });
@@ -178,21 +179,22 @@ fn random_programs_by_lowered_pipelines_do_what_the_model_says() {
 
 #[test]
 fn an_empty_program_leaves_nothing() {
-    let Some(env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
+    let Some(env) = Environment::new(Queues::Own) else { return };
     assert!(run_and_check(&env, &[]).is_ok(), "{:?}", run_and_check(&env, &[]));
 }
 
 /// A model that is wrong about one kind of commands is found out, and the program shrinks to what shows it.
 #[test]
 fn a_wrong_model_is_detected_and_the_program_shrunk() {
-    let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
+    let Some(mut env) = Environment::new(Queues::Own) else { return };
     env.wrong_about = Some((Kind::FillBuffer, 1));
     let failing = (0..MOST_TRIED).map(|seed| program(seed, LENGTH)).find(|ops| run(&env, ops).is_err());
     let ops = failing.unwrap_or_default();
     assert!(!ops.is_empty(), "no program of {MOST_TRIED} finds out that the model is wrong");
     let small = shrink(&ops, TRIES, |ops| run(&env, ops).is_err());
     assert!(small.len() <= 3, "{small:#?}");
-    assert!(small.iter().any(|op| op.kind == Kind::FillBuffer), "{small:#?}");
+    let fills = [Kind::FillBuffer, Kind::RecordOnThreads, Kind::RecordAnyOnThreads];
+    assert!(small.iter().any(|op| fills.contains(&op.kind)), "{small:#?}");
     assert!(small.iter().any(|op| op.kind == Kind::CreateBuffer), "{small:#?}");
     env.wrong_about = None;
     assert!(run(&env, &small).is_ok(), "the library itself is right");
@@ -201,7 +203,7 @@ fn a_wrong_model_is_detected_and_the_program_shrunk() {
 /// A model that is wrong about any operation with an effect is found out.
 #[test]
 fn a_wrong_model_of_each_operation_is_detected() {
-    let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
+    let Some(mut env) = Environment::new(Queues::Own) else { return };
     let kinds: Vec<Kind> = Kind::with_effect().into_iter().filter(|kind| is_supported(&env, *kind)).collect();
     eprintln!("{} kinds", kinds.len());
     assert!(kinds.len() > 30, "{kinds:?}");
@@ -219,8 +221,8 @@ fn number(variable: &str, default: u64) -> u64 {
     std::env::var(variable).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
 }
 
-/// Runs `LVK_RANDOM_PROGRAMS` programs from seed `LVK_RANDOM_SEED` on, on `LVK_RANDOM_THREADS` threads, for both kinds
-/// of queues in turn.
+/// Runs `LVK_RANDOM_PROGRAMS` programs from seed `LVK_RANDOM_SEED` on, on `LVK_RANDOM_THREADS` threads, for each kind of
+/// queues in turn.
 #[test]
 #[ignore = "long: .ci/slow random"]
 fn many_random_programs() {

@@ -2,9 +2,7 @@
 
 use std::sync::Barrier;
 
-use lvk::QueueRequest;
-
-use super::environment::Environment;
+use super::environment::{Environment, Queues};
 use super::op::{Op, write_program};
 use super::run::{Failure, run};
 use super::shrink::shrink;
@@ -43,7 +41,7 @@ pub fn run_and_check(env: &Environment, ops: &[Op]) -> Result<(), Failure> {
 
 /// Runs candidates one after the other, on a context that a failure replaces.
 struct Candidates<'a> {
-    queues: QueueRequest,
+    queues: Queues,
     dog: &'a Watchdog,
     env: Option<Environment>,
 }
@@ -52,7 +50,8 @@ impl Candidates<'_> {
     /// Runs a program, several times if it has several threads.
     fn run(&mut self, ops: &[Op]) -> Result<(), Failure> {
         let is_threaded = ops.iter().any(|op| op.thread != ops[0].thread);
-        for _ in 0..if is_threaded { REPEATS } else { 1 } {
+        let depends_on_time = is_threaded || self.queues == Queues::Unordered;
+        for _ in 0..if depends_on_time { REPEATS } else { 1 } {
             self.dog.program_ended();
             let Some(env) = self.env.take().or_else(|| Environment::new(self.queues)) else { return Ok(()) };
             run_and_check(&env, ops)?;
@@ -64,7 +63,7 @@ impl Candidates<'_> {
 
 /// Shrinks a failing program. Returns a report with the text of the small one. Of a program on several threads, `ops`
 /// holds the operations of all, those of the thread that failed as thread 0: it is tried alone first.
-pub fn report(queues: QueueRequest, ops: &[Op], failure: &Failure, dog: &Watchdog) -> String {
+pub fn report(queues: Queues, ops: &[Op], failure: &Failure, dog: &Watchdog) -> String {
     eprintln!("a program with {queues:?} fails and is shrunk: {failure:?}");
     let mut candidates = Candidates { queues, dog, env: None };
     let alone: Vec<Op> = ops.iter().filter(|op| op.thread == 0).copied().collect();
@@ -91,7 +90,7 @@ mod tests {
     /// A model that is wrong only beside other threads: the program that shows it keeps two of its four threads.
     #[test]
     fn a_wrong_model_beside_other_threads_is_detected_and_the_program_shrunk() {
-        let Some(mut env) = Environment::new(QueueRequest::OwnHardware) else { return };
+        let Some(mut env) = Environment::new(Queues::Own) else { return };
         env.wrong_about = Some((Kind::FillBuffer, 2));
         let of_thread = |thread: u8| {
             let ops = program(u64::from(thread), 300).into_iter();

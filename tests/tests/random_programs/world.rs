@@ -18,6 +18,7 @@ use super::plan::Planned;
 use super::plan_pipelines::RaysInfo;
 use super::plan_records::RECORD_BYTES;
 use super::queries::{OpenQueries, QueryPools};
+use super::shared::OwnPart;
 
 /// Reason why a call must fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -190,6 +191,8 @@ pub struct Open {
     pub blas: HashMap<usize, u32>,
     /// Queries that its commands write.
     pub queries: OpenQueries,
+    /// True if a command builds the BLAS that threads share.
+    pub builds_shared: bool,
 }
 
 /// Updates of a TLAS in a command buffer.
@@ -270,6 +273,8 @@ pub struct World<'a> {
     /// Instances of TLAS.
     pub records: Holder<BufferHandle>,
     pub queries: QueryPools,
+    /// Part of the objects that threads share, if there was one left.
+    pub part: Option<OwnPart<'a>>,
     /// Counts so far.
     pub tally: Tally,
     /// Kind of the operation that runs.
@@ -285,6 +290,7 @@ impl<'a> World<'a> {
             let desc = lvk::BufferDesc { size_bytes, usage, debug_name, ..Default::default() };
             env.ctx().create_buffer(&desc)
         };
+        let mut memory = Memory::default();
         let inputs = BufferUsage::VERTEX | BufferUsage::INDEX | BufferUsage::INDIRECT;
         Ok(Self {
             arguments: own("arguments", 16, BufferUsage::INDIRECT)?,
@@ -292,8 +298,9 @@ impl<'a> World<'a> {
             draw_number: own("number of draws", 8, BufferUsage::INDIRECT)?,
             records: own("instances", RECORD_BYTES, BufferUsage::STORAGE)?,
             queries: QueryPools::new(env.ctx())?,
+            part: env.shared.take_part(env.ctx(), &mut memory)?,
             env,
-            memory: Memory::default(),
+            memory,
             buffers: Vec::new(),
             textures: Vec::new(),
             samplers: Vec::new(),
@@ -347,11 +354,13 @@ impl<'a> World<'a> {
 
     /// Records a planned command into an open command buffer.
     pub fn record(&mut self, at: usize, planned: Planned) -> Result<(), String> {
-        let Planned { kind, action, problems, effects } = planned;
-        self.tally.record_problems(kind, &problems);
-        let (env, open) = (self.env, &mut self.open[at]);
-        match judge(action(env, &mut open.cmd), &problems)? {
-            Some(()) => open.effects.extend(effects),
+        let (kind, problems) = (planned.kind, planned.problems.clone());
+        let open = &mut self.open[at];
+        let recorded = planned.run(self.env, &mut open.cmd)?;
+        let is_gone = recorded.is_none() && problems.is_empty();
+        self.tally.record_problems(kind, if is_gone { &[Problem::Stale] } else { &problems });
+        match recorded {
+            Some(effects) => open.effects.extend(effects),
             None => self.tally.refused += 1,
         }
         self.tally.executed += 1;

@@ -6,7 +6,7 @@ use lvk::{
     ColorAttachment, CompareOp, Context, Dependencies, DepthAttachment, DepthResolve, DepthTest,
     DeviceProfile, Error, Format, Holder, OptionalFeature, RenderPassDesc, RenderPipelineDesc,
     RenderPipelineHandle, Resolve, ResolveMode, ResolveModes, ShaderStage, StencilFace, StencilLoadOp,
-    StencilOp, StencilTest, TextureDesc, TextureHandle, TextureUsage,
+    StencilOp, StencilTest, TextureDesc, TextureHandle, TextureKind, TextureUsage,
 };
 use lvk_tests::compute::Evaluator;
 use lvk_tests::raster::{
@@ -74,6 +74,39 @@ fn an_edge_is_resolved_to_the_mean_of_its_samples() {
     assert_eq!(found, means);
     let edge = found.iter().filter(|value| **value > 0.0 && **value < 1.0).count();
     assert!(edge >= 4 && found[0] == 1.0 && found[7] == 0.0, "{found:?}");
+}
+
+#[test]
+fn a_slice_of_a_volume_is_resolved_to_or_refused() {
+    let Some(ctx) = device() else { return };
+    let (format, size) = (Format::Rgba8Unorm, [2, 2]);
+    let volume = ctx
+        .create_texture(&TextureDesc {
+            kind: TextureKind::D3 { depth: 3 },
+            format,
+            extent: size,
+            usage: TextureUsage::TARGET | TextureUsage::SAMPLED,
+            data: Some(&[0; 48]),
+            debug_name: "volume",
+            ..Default::default()
+        })
+        .unwrap();
+    let drawn = many(&ctx, format, size);
+    for slice in 0..3 {
+        let resolve = Some(Resolve { texture: *volume, mip: 0, layer: slice });
+        let color = [ColorAttachment { resolve, ..ColorAttachment::clear(*drawn, [1.0; 4]) }];
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        let begun = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).map(|_| ());
+        if !ctx.capabilities().resolves_to_volumes {
+            unsupported(begun, "a resolve to a slice of 'volume'");
+            continue;
+        }
+        begun.unwrap();
+        ctx.submit(cmd).unwrap();
+        let bytes = ctx.download_texture(*volume, &Default::default()).unwrap();
+        let is_white = |at: usize| bytes[16 * at..16 * (at + 1)] == [255; 16];
+        assert_eq!([0, 1, 2].map(is_white), [0, 1, 2].map(|at| at <= slice as usize), "slice {slice}");
+    }
 }
 
 /// Each sample has its own value, so that modes differ.

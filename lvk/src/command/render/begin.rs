@@ -30,7 +30,8 @@ impl CommandBuffer {
     /// [`LimitExceeded`](Error::LimitExceeded) for too many colour targets, layers or views;
     /// [`Unsupported`](Error::Unsupported) for views without
     /// [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview), and for local reads without
-    /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead); [`WrongQueue`](Error::WrongQueue) on queues
+    /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead), and for resolves to volumes without
+    /// [`Capabilities::resolves_to_volumes`](crate::Capabilities::resolves_to_volumes); [`WrongQueue`](Error::WrongQueue) on queues
     /// other than the graphics queue.
     pub fn begin_rendering(&mut self, desc: &RenderPassDesc<'_>) -> Result<RenderPass<'_>> {
         self.needs_graphics("a render pass")?;

@@ -21,6 +21,10 @@ impl CommandBuffer {
         info: vk::RenderingAttachmentInfo<'static>,
     ) -> Result<vk::RenderingAttachmentInfo<'static>> {
         check_resolve(source, to)?;
+        if to.texture.kind.is_3d() && !self.shared.gpu.caps.resolves_to_volumes {
+            let reason = "NVIDIA's driver leaves the slice as it is; resolve to a 2D texture and copy it";
+            return Err(Error::unsupported(format!("a resolve to a slice of '{}'", to.texture.name), reason));
+        }
         self.use_texture(&source.texture, source.subresources(), Use::resolve_source())?;
         self.use_texture(&to.texture, to.subresources(), Use::resolve_target())?;
         let mode = color_resolve_mode(source.texture.format);

@@ -349,7 +349,8 @@ fn create_instance(
     #[cfg(any(test, feature = "test-hooks"))]
     let made = made
         .map(crate::test_support::null_commands::wrap_null_commands)
-        .map(crate::test_support::fault_injection::wrap_fault_injection);
+        .map(crate::test_support::fault_injection::wrap_fault_injection)
+        .map(crate::test_support::unordered_queues::wrap_unordered_queues);
     made.map_err(|result| match result {
         // The loader returns this if it can load no driver.
         vk::Result::ERROR_INCOMPATIBLE_DRIVER => {

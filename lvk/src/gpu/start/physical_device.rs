@@ -207,6 +207,7 @@ impl PhysicalDevice {
         caps.max_anisotropy = plain.limits.max_sampler_anisotropy;
         caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.driver_id = v12.driver_id;
+        caps.resolves_to_volumes = v12.driver_id != vk::DriverId::NVIDIA_PROPRIETARY;
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = Limits::from_properties(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::from_properties(&mesh);
