@@ -3,10 +3,13 @@
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use lvk::ash::{Entry, vk};
+use lvk::test_hooks::with_unordered_queues;
 use lvk::{
-    Context, ContextDesc, Error, RayQueryRequest, RayTracingPipelineRequest, ValidationMode, ValidationSink,
+    Context, ContextDesc, Error, QueueRequest, RayQueryRequest, RayTracingPipelineRequest, ValidationMode,
+    ValidationSink,
 };
 use lvk_dev_driver::{DriverError, DriverRequest, is_set, prepare, radv_icd, swiftshader_icd};
 
@@ -85,10 +88,18 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
         ..Default::default()
     };
     adjust(&mut desc);
-    let made = match Context::new(&desc) {
+    let seed = unordered_queues();
+    if seed.is_some() && desc.queues == QueueRequest::OwnHardware {
+        desc.queues = QueueRequest::Emulated;
+    }
+    let new = |desc: &ContextDesc<'_>| match seed {
+        Some(seed) => with_unordered_queues(seed, || Context::new(desc)),
+        None => Context::new(desc),
+    };
+    let made = match new(&desc) {
         Err(Error::NoDevice { .. }) if desc.ray_tracing_pipeline == RayTracingPipelineRequest::Query => {
             desc.ray_tracing_pipeline = RayTracingPipelineRequest::HardwareIfPresent;
-            Context::new(&desc)
+            new(&desc)
         }
         made => made,
     };
@@ -126,6 +137,13 @@ fn ray_tracing_pipeline() -> RayTracingPipelineRequest {
         Ok("software") => RayTracingPipelineRequest::Software,
         _ => RayTracingPipelineRequest::HardwareIfPresent,
     }
+}
+
+/// Returns a seed for queues that run late and in a random order, if `LVK_TEST_QUEUES` is `unordered`: another one for each context.
+fn unordered_queues() -> Option<u64> {
+    static COUNT: AtomicU64 = AtomicU64::new(1);
+    let is_wanted = std::env::var("LVK_TEST_QUEUES").is_ok_and(|value| value == "unordered");
+    is_wanted.then(|| COUNT.fetch_add(1, Ordering::Relaxed).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
 /// Returns the value of `LVK_TEST_VALIDATION`: `gpu`, `off`, or core and synchronization validation.

@@ -32,6 +32,11 @@ pub(crate) fn with_failing_device<T>(make: impl FnOnce() -> T) -> T {
     made
 }
 
+/// True while devices that this thread creates can fail.
+pub(crate) fn injects_faults() -> bool {
+    INJECT_FAULTS.get()
+}
+
 /// Makes one submission of this thread fail with `failure`, after `submissions` that succeed.
 pub(crate) fn fail_after(submissions: u32, failure: vk::Result) {
     SUBMITS_LEFT.set(Some(submissions));

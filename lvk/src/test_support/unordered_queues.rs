@@ -12,16 +12,18 @@ use std::time::Duration;
 
 use ash::vk;
 
+use super::fault_injection::injects_faults;
+
 /// Longest pause before a submission is handed on, in microseconds.
 const LONGEST_PAUSE: u64 = 400;
 
 thread_local! {
     static SEED: Cell<Option<u64>> = const { Cell::new(None) };
+    static REAL: Cell<Option<vk::PFN_vkGetDeviceProcAddr>> = const { Cell::new(None) };
 }
 
 static DEVICES: Mutex<Vec<(vk::Device, Arc<Device>)>> = Mutex::new(Vec::new());
 static QUEUES: Mutex<Vec<(vk::Queue, Arc<Device>)>> = Mutex::new(Vec::new());
-static REAL: Mutex<Option<vk::PFN_vkGetDeviceProcAddr>> = Mutex::new(None);
 
 /// Runs `make`. Queues of devices that it creates on this thread run late and in a random order.
 pub(crate) fn with_unordered_queues<T>(seed: u64, make: impl FnOnce() -> T) -> T {
@@ -31,13 +33,14 @@ pub(crate) fn with_unordered_queues<T>(seed: u64, make: impl FnOnce() -> T) -> T
     made
 }
 
-/// Returns the instance unchanged, or one whose devices have such queues.
+/// Returns the instance unchanged, or one whose devices have such queues. Faults are injected on the thread that submits, so devices that can
+/// fail have none.
 pub(crate) fn wrap_unordered_queues(raw: ash::Instance) -> ash::Instance {
-    if SEED.get().is_none() {
+    if SEED.get().is_none() || injects_faults() {
         return raw;
     }
     let mut functions = raw.fp_v1_0().clone();
-    *lock(&REAL) = Some(functions.get_device_proc_addr);
+    REAL.set(Some(functions.get_device_proc_addr));
     functions.get_device_proc_addr = look_up;
     ash::Instance::from_parts_1_3(raw.handle(), functions, raw.fp_v1_1().clone(), raw.fp_v1_3().clone())
 }
@@ -49,6 +52,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// The functions of the driver.
 #[derive(Clone, Copy)]
 struct Functions {
+    look_up: vk::PFN_vkGetDeviceProcAddr,
     submit: vk::PFN_vkQueueSubmit2,
     wait_queue: vk::PFN_vkQueueWaitIdle,
     wait_device: vk::PFN_vkDeviceWaitIdle,
@@ -58,6 +62,8 @@ struct Functions {
     begin_label: Option<vk::PFN_vkQueueBeginDebugUtilsLabelEXT>,
     end_label: Option<vk::PFN_vkQueueEndDebugUtilsLabelEXT>,
     insert_label: Option<vk::PFN_vkQueueInsertDebugUtilsLabelEXT>,
+    /// Presentation, where the device has swapchains.
+    present: Option<vk::PFN_vkQueuePresentKHR>,
 }
 
 /// A device, and the submissions that it has not got yet.
@@ -206,7 +212,8 @@ impl Device {
 /// # Safety
 /// As `vkGetDeviceProcAddr`.
 unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
-    let real = (*lock(&REAL))?;
+    let known = find_device(device);
+    let real = known.as_ref().map(|known| known.real.look_up).or_else(|| REAL.get())?;
     // SAFETY: the caller's device is passed to the real function. The functions of these names have these types, and all
     // have the size of a pointer; every device has them.
     unsafe {
@@ -221,24 +228,26 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
             };
         }
         let name = CStr::from_ptr(name);
-        macro_rules! label {
+        macro_rules! optional {
             ($name:literal) => {
                 real(device, $name.as_ptr())
                     .map(|found| std::mem::transmute::<unsafe extern "system" fn(), _>(found))
             };
         }
         if let Some(seed) = SEED.get()
-            && !lock(&DEVICES).iter().any(|(known, _)| *known == device)
+            && known.is_none()
         {
             let real = Functions {
+                look_up: real,
                 submit: real!(c"vkQueueSubmit2"),
                 wait_queue: real!(c"vkQueueWaitIdle"),
                 wait_device: real!(c"vkDeviceWaitIdle"),
                 get_queue: real!(c"vkGetDeviceQueue"),
                 destroy: real!(c"vkDestroyDevice"),
-                begin_label: label!(c"vkQueueBeginDebugUtilsLabelEXT"),
-                end_label: label!(c"vkQueueEndDebugUtilsLabelEXT"),
-                insert_label: label!(c"vkQueueInsertDebugUtilsLabelEXT"),
+                begin_label: optional!(c"vkQueueBeginDebugUtilsLabelEXT"),
+                end_label: optional!(c"vkQueueEndDebugUtilsLabelEXT"),
+                insert_label: optional!(c"vkQueueInsertDebugUtilsLabelEXT"),
+                present: optional!(c"vkQueuePresentKHR"),
             };
             let state = Mutex::new(State { random: seed | 1, ..State::default() });
             let made =
@@ -254,6 +263,7 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
             b"vkQueueBeginDebugUtilsLabelEXT" => own!(begin_label, vk::PFN_vkQueueBeginDebugUtilsLabelEXT),
             b"vkQueueEndDebugUtilsLabelEXT" => own!(end_label, vk::PFN_vkQueueEndDebugUtilsLabelEXT),
             b"vkQueueInsertDebugUtilsLabelEXT" => own!(insert_label, vk::PFN_vkQueueInsertDebugUtilsLabelEXT),
+            b"vkQueuePresentKHR" => own!(present, vk::PFN_vkQueuePresentKHR),
             b"vkDestroyDevice" => own!(destroy, vk::PFN_vkDestroyDevice),
             _ => real(device, name.as_ptr()),
         }
@@ -362,6 +372,18 @@ unsafe extern "system" fn insert_label(queue: vk::Queue, label: *const vk::Debug
         // SAFETY: the caller upholds the contract of `vkQueueInsertDebugUtilsLabelEXT`.
         unsafe { insert(queue, label) };
     }
+}
+
+/// # Safety
+/// As `vkQueuePresentKHR`.
+unsafe extern "system" fn present(queue: vk::Queue, info: *const vk::PresentInfoKHR<'_>) -> vk::Result {
+    let Some(device) = device_of(queue) else { return vk::Result::ERROR_UNKNOWN };
+    let Some(present) = device.real.present else { return vk::Result::ERROR_UNKNOWN };
+    // The submissions that signal what the presentation waits for come before.
+    device.drain();
+    let _using = lock(&device.queue_use);
+    // SAFETY: the caller upholds the contract of `vkQueuePresentKHR`.
+    unsafe { present(queue, info) }
 }
 
 /// # Safety
