@@ -101,15 +101,12 @@ impl CompactedSizeQuery {
         *self.submission.lock() = Some(QuerySubmission { value, builds });
     }
 
-    /// Returns the copies to record; `None` until the GPU has written the results. Before its submission is done, which
-    /// `is_done` tells by the value, the pool is not reset either, and may answer anything.
-    pub(crate) fn results(
-        &self,
-        is_done: impl FnOnce(u64) -> Result<bool>,
-    ) -> Result<Option<Vec<PlannedCopy>>> {
+    /// Returns the copies to record; `None` until the GPU has written the results. `completed` is the value that it has reached. Availability
+    /// alone does not tell: lavapipe also answers queries that are not written yet.
+    pub(crate) fn results(&self, completed: u64) -> Result<Option<Vec<PlannedCopy>>> {
         let submission = self.submission.lock().clone();
         let Some(QuerySubmission { value, builds }) = submission else { return Ok(None) };
-        if !is_done(value)? {
+        if value > completed {
             return Ok(None);
         }
         let sizes: Option<Vec<_>> = self.pool.values(0, self.pool.count)?.into_iter().collect();

@@ -115,7 +115,7 @@ impl Context {
         shared.collect()?;
         compactions.drop_freed();
         for query in std::mem::take(&mut compactions.queries) {
-            match shared.submitter.explain_loss(query.results(|value| shared.submitter.is_done(value))) {
+            match shared.submitter.explain_loss(query.results(completed)) {
                 Ok(Some(copies)) => compactions.copies.extend(copies),
                 Ok(None) => compactions.queries.push(query),
                 Err(error) => query.targets.iter().for_each(|(target, _)| abort_compaction(target, &error)),

@@ -21,7 +21,8 @@ impl Context {
 
     /// Reads the results of `out.len()` queries from `first` on: ticks of
     /// [`timestamp_period_ns`](crate::Limits::timestamp_period_ns) for timestamps, samples for occlusion. `None` if the
-    /// GPU has not reached the query or the query was reset (`vkGetQueryPoolResults`). Neither waits nor allocates.
+    /// GPU has not reached the query or the query was reset (`vkGetQueryPoolResults`). Until the GPU has run the reset, the former result stays.
+    /// Neither waits nor allocates.
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of pipeline

@@ -100,13 +100,7 @@ impl CommandRing {
         self.queues[recording.queue_index].in_flight.push_back(recording);
     }
 
-    /// Takes back a command buffer whose submission failed.
-    pub(crate) fn take_back(&mut self, recording: Box<Recording>) {
-        self.forget(&recording);
-        self.queues[recording.queue_index].free.push(recording);
-    }
-
-    /// Forgets a command buffer that was never submitted.
+    /// Forgets a command buffer that was never submitted. The caller destroys it.
     pub(crate) fn forget(&mut self, recording: &Recording) {
         self.end_recording(recording.sequence);
         self.discarded.extend(recording.is_staged.then_some(recording.sequence));

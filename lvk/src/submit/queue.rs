@@ -162,8 +162,8 @@ impl<T> Submitter<T> {
         ticket.begin(&self.gpu).inspect_err(|_| self.lock().ring.end_recording(sequence))
     }
 
-    /// Destroys a command buffer that was not submitted. To record it anew is not enough: NVIDIA's driver 580 then runs the last
-    /// copy that it held.
+    /// Destroys a command buffer that was not submitted. To record it anew is not enough: NVIDIA's driver 580.159 then runs the last copy
+    /// that it held.
     pub(crate) fn discard(&self, recording: Box<Recording>) {
         self.lock().ring.forget(&recording);
         recording.destroy(&self.gpu);
@@ -215,7 +215,8 @@ impl<T> Submitter<T> {
             Ok(last) => inner.record_submission(&submission, *last),
             Err(error) => inner.broken = Some(error.clone()),
         }
-        let mut put_away = |part: Option<Box<Recording>>| part.map_or(0, |part| inner.file_recording(part));
+        let mut put_away =
+            |part: Option<Box<Recording>>| part.map_or(0, |part| inner.file_recording(&self.gpu, part));
         let values = SubmitValues { prelude: put_away(submission.prelude), main: put_away(submission.main) };
         (values, sent.map(drop))
     }
@@ -312,7 +313,7 @@ impl<T> Submitter<T> {
         recording.labels.set_name("ownership transfer");
         let sent = self.record_transfers(inner, release, &recording, images);
         recording.value = if sent.is_ok() { release.value } else { 0 };
-        inner.file_recording(recording);
+        inner.file_recording(&self.gpu, recording);
         sent
     }
 
@@ -555,13 +556,14 @@ impl<T> SubmitterState<T> {
         self.ring.take_ticket(queue_index)
     }
 
-    /// Stores a submitted command buffer until its queue is done with it, or takes back one that was not submitted.
-    /// Returns its value.
-    fn file_recording(&mut self, recording: Box<Recording>) -> u64 {
+    /// Stores a submitted command buffer until its queue is done with it, or destroys one that was not submitted. Returns its value.
+    fn file_recording(&mut self, gpu: &Gpu, recording: Box<Recording>) -> u64 {
         let value = recording.value;
-        match value {
-            0 => self.ring.take_back(recording),
-            _ => self.ring.mark_submitted(recording),
+        if value > 0 {
+            self.ring.mark_submitted(recording);
+        } else {
+            self.ring.forget(&recording);
+            recording.destroy(gpu);
         }
         value
     }

@@ -25,8 +25,9 @@ pub fn null_command_context(desc: &ContextDesc<'_>) -> Result<Context> {
     with_null_commands(|| Context::new(desc))
 }
 
-/// Runs `make`. The queues of contexts that it creates run late and side by side, in an order that `seed` and chance decide, as far as
-/// submissions do not wait for each other. Queues that share a Vulkan queue need [`QueueRequest::Emulated`](crate::QueueRequest::Emulated).
+/// Runs `make`. The queues of contexts that it creates run late and interleaved, in an order that `seed` and chance decide, as far as
+/// submissions do not wait for each other. A context with [`QueueRequest::Emulated`](crate::QueueRequest::Emulated) has three such queues on any
+/// device. Contexts of [`with_fault_injection`] have none.
 pub fn with_unordered_queues<T>(seed: u64, make: impl FnOnce() -> T) -> T {
     crate::test_support::unordered_queues::with_unordered_queues(seed, make)
 }

@@ -1,7 +1,7 @@
-//! Devices whose queues run late and side by side, in a random order: what a submission does not wait for may run after it.
+//! Devices whose queues run late and interleaved in a random order: what a submission does not wait for may run after it.
 //!
-//! A software driver has one Vulkan queue, which runs submissions soon and in order, and so hides a wait that lacks. Here the
-//! submissions of each timeline semaphore are a queue of their own. A thread hands them to the real queue one by one, as
+//! A software driver has one Vulkan queue, which runs submissions soon and in order, and so hides a missing wait. Here the
+//! submissions that signal one timeline semaphore are a queue of their own. A thread hands them to the real queue one by one, as
 //! their waits and chance allow, and lets the caller run ahead.
 
 use std::cell::Cell;
@@ -27,10 +27,15 @@ static QUEUES: Mutex<Vec<(vk::Queue, Arc<Device>)>> = Mutex::new(Vec::new());
 
 /// Runs `make`. Queues of devices that it creates on this thread run late and in a random order.
 pub(crate) fn with_unordered_queues<T>(seed: u64, make: impl FnOnce() -> T) -> T {
-    SEED.set(Some(seed));
-    let made = make();
-    SEED.set(None);
-    made
+    /// Sets the seed of before, also after a panic.
+    struct Restore(Option<u64>);
+    impl Drop for Restore {
+        fn drop(&mut self) {
+            SEED.set(self.0);
+        }
+    }
+    let _restore = Restore(SEED.replace(Some(seed)));
+    make()
 }
 
 /// Returns the instance unchanged, or one whose devices have such queues. Faults are injected on the thread that submits, so devices that can
@@ -79,13 +84,11 @@ struct Device {
 struct State {
     /// Submissions in order, by the timeline semaphore that they signal.
     lanes: Vec<(vk::Semaphore, VecDeque<Held>)>,
-    /// Values that submissions signal which the driver has.
+    /// Values that the driver's submissions signal.
     signalled: HashMap<vk::Semaphore, u64>,
     random: u64,
     /// True while a submission is handed to the driver.
     is_busy: bool,
-    /// Result of a submission that the driver refused.
-    failure: Option<vk::Result>,
     has_ended: bool,
 }
 
@@ -105,6 +108,12 @@ struct Batch {
 
 // SAFETY: none of the Vulkan structures has a `pNext` pointer; the library sets none.
 unsafe impl Send for Batch {}
+
+impl Held {
+    fn signals(&self) -> impl Iterator<Item = &vk::SemaphoreSubmitInfo<'static>> {
+        self.batches.iter().flat_map(|batch| &batch.signals)
+    }
+}
 
 impl Batch {
     fn info(&self) -> vk::SubmitInfo2<'_> {
@@ -126,10 +135,14 @@ impl State {
 
     /// True if the driver has every submission that signals what this one waits for.
     fn is_ready(&self, held: &Held) -> bool {
-        let is_known = |semaphore| self.lanes.iter().any(|(lane, _)| *lane == semaphore);
+        let is_held = |semaphore| {
+            let mut others =
+                self.lanes.iter().flat_map(|(_, lane)| lane).filter(|other| !std::ptr::eq(*other, held));
+            others.any(|other| other.signals().any(|signal| signal.semaphore == semaphore))
+        };
         let has = |wait: &vk::SemaphoreSubmitInfo<'_>| {
             let value = self.signalled.get(&wait.semaphore).copied().unwrap_or(0);
-            value >= wait.value || !is_known(wait.semaphore)
+            (wait.value > 0 && value >= wait.value) || !is_held(wait.semaphore)
         };
         held.batches.iter().flat_map(|batch| &batch.waits).all(has)
     }
@@ -149,20 +162,15 @@ impl State {
 
 impl Device {
     /// Adds a submission.
-    fn push(&self, held: Held) -> vk::Result {
+    fn push(&self, held: Held) {
         let mut state = lock(&self.state);
-        if let Some(failure) = state.failure {
-            return failure;
-        }
-        let signals = held.batches.iter().flat_map(|batch| &batch.signals);
-        let timeline = signals.filter(|signal| signal.value > 0).last();
+        let timeline = held.signals().filter(|signal| signal.value > 0).last();
         let timeline = timeline.map_or(vk::Semaphore::null(), |signal| signal.semaphore);
         match state.lanes.iter_mut().find(|(lane, _)| *lane == timeline) {
             Some((_, lane)) => lane.push_back(held),
             None => state.lanes.push((timeline, VecDeque::from([held]))),
         }
         self.has_changed.notify_all();
-        vk::Result::SUCCESS
     }
 
     /// Hands submissions to the driver until the device ends.
@@ -181,12 +189,14 @@ impl Device {
             drop(state);
             std::thread::sleep(Duration::from_micros(pause));
             let result = self.submit(&held);
+            if result != vk::Result::SUCCESS {
+                // The caller has its answer already, and would wait for ever.
+                eprintln!("a submission that was held back failed: {result:?}");
+                std::process::abort();
+            }
             state = lock(&self.state);
             state.is_busy = false;
-            if result != vk::Result::SUCCESS {
-                state.failure = Some(result);
-            }
-            for signal in held.batches.iter().flat_map(|batch| &batch.signals) {
+            for signal in held.signals() {
                 state.signalled.insert(signal.semaphore, signal.value);
             }
             self.has_changed.notify_all();
@@ -254,6 +264,8 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
                 Arc::new(Device { real, state, has_changed: Condvar::new(), queue_use: Mutex::new(()) });
             lock(&DEVICES).push((device, Arc::clone(&made)));
             std::thread::spawn(move || made.run());
+        } else if known.is_none() {
+            return real(device, name.as_ptr());
         }
         match name.to_bytes() {
             b"vkQueueSubmit2" => own!(submit, vk::PFN_vkQueueSubmit2),
@@ -320,7 +332,8 @@ unsafe extern "system" fn submit(
             signals: list(info.p_signal_semaphore_infos.cast(), info.signal_semaphore_info_count),
         }
     });
-    device.push(Held { queue, batches: batches.collect(), fence })
+    device.push(Held { queue, batches: batches.collect(), fence });
+    vk::Result::SUCCESS
 }
 
 /// # Safety
@@ -328,6 +341,7 @@ unsafe extern "system" fn submit(
 unsafe extern "system" fn wait_queue(queue: vk::Queue) -> vk::Result {
     let Some(device) = device_of(queue) else { return vk::Result::ERROR_UNKNOWN };
     device.drain();
+    let _using = lock(&device.queue_use);
     // SAFETY: the caller upholds the contract of `vkQueueWaitIdle`.
     unsafe { (device.real.wait_queue)(queue) }
 }
@@ -337,6 +351,7 @@ unsafe extern "system" fn wait_queue(queue: vk::Queue) -> vk::Result {
 unsafe extern "system" fn wait_device(device: vk::Device) -> vk::Result {
     let Some(found) = find_device(device) else { return vk::Result::ERROR_UNKNOWN };
     found.drain();
+    let _using = lock(&found.queue_use);
     // SAFETY: the caller upholds the contract of `vkDeviceWaitIdle`.
     unsafe { (found.real.wait_device)(device) }
 }

@@ -10,3 +10,4 @@ mod queues;
 mod submission;
 mod threads;
 mod timestamps;
+mod unordered_queues;

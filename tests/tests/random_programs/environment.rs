@@ -22,7 +22,7 @@ pub enum Queues {
     Own,
     /// Three on one Vulkan queue.
     Emulated,
-    /// As emulated ones, but late and side by side: what a submission does not wait for may run after it.
+    /// As emulated ones, but late and in a random order: what a submission does not wait for may run after it.
     Unordered,
 }
 
@@ -112,11 +112,16 @@ pub struct Environment {
 impl Environment {
     /// Creates both contexts. `None` as for [`lvk_tests::device`].
     pub fn new(queues: Queues) -> Option<Self> {
+        Self::with_seed(queues, 1)
+    }
+
+    /// As [`new`](Self::new), with a seed for the order of unordered queues.
+    pub fn with_seed(queues: Queues, seed: u64) -> Option<Self> {
         let make = |queues| device_with(|desc| desc.queues = queues);
         let made = match queues {
             Queues::Own => make(QueueRequest::OwnHardware),
             Queues::Emulated => make(QueueRequest::Emulated),
-            Queues::Unordered => with_unordered_queues(1, || make(QueueRequest::Emulated)),
+            Queues::Unordered => with_unordered_queues(seed, || make(QueueRequest::Emulated)),
         };
         let (ctx, sink) = made?.into_context();
         let (other, other_sink) = device_with(|_| {})?.into_context();

@@ -304,6 +304,23 @@ impl World<'_> {
         Ok(true)
     }
 
+    /// Compares the own part and layer at the end of the program.
+    pub(super) fn compare_part(&self) -> Result<(), String> {
+        let Some(part) = self.part() else { return Ok(()) };
+        let (at, layer) = part.place(true);
+        let mut bytes = vec![0; PART_BYTES];
+        judge(self.ctx().download_buffer(*self.env.shared.buffer, at, &mut bytes), &[])?;
+        compare("the part of the shared buffer at the end", &bytes, &self.memory.buffers[part.bytes[0]])?;
+        let texels = self.ctx().download_texture(*self.env.shared.texture, &region_of(layer));
+        let place = layer_part(part.images[0]).whole(0);
+        let expected = self.memory.images[place.image].read(&place);
+        compare(
+            "the layer of the shared texture at the end",
+            &judge(texels, &[])?.unwrap_or_default(),
+            &expected,
+        )
+    }
+
     /// Destroys the objects that are replaced, and makes them anew.
     pub(super) fn replace_shared(&self) -> Outcome {
         judge(self.env.shared.replace(self.ctx()), &[]).map(|_| true)

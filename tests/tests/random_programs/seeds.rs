@@ -30,7 +30,8 @@ const CHECKED_EVERY: u64 = 16;
 /// # Panics
 /// When one of them fails.
 fn run_seeds(queues: Queues, seeds: impl Iterator<Item = u64>, dog: &Watchdog) -> Option<Tally> {
-    let env = Environment::new(queues)?;
+    let mut seeds = seeds.peekable();
+    let env = Environment::with_seed(queues, seeds.peek().copied().unwrap_or(0))?;
     let mut total = Tally::default();
     for (count, seed) in (1..).zip(seeds) {
         let ops = program(seed, LENGTH);
@@ -57,7 +58,7 @@ fn run_seeds(queues: Queues, seeds: impl Iterator<Item = u64>, dog: &Watchdog) -
 /// # Panics
 /// When one of them fails. It is shrunk together with those that ran beside it.
 fn run_on_threads(queues: Queues, seeds: &[u64], threads: usize, dog: &Watchdog) -> Option<Tally> {
-    let env = Environment::new(queues)?;
+    let env = Environment::with_seed(queues, seeds.first().copied().unwrap_or(0))?;
     let (next, total) = (AtomicU64::new(0), Mutex::new(Tally::default()));
     let running: Vec<Mutex<Option<u64>>> = (0..threads).map(|_| Mutex::default()).collect();
     let failed: OnceLock<(Vec<u64>, Failure)> = OnceLock::new();
