@@ -162,8 +162,8 @@ impl<T> Submitter<T> {
         ticket.begin(&self.gpu).inspect_err(|_| self.lock().ring.end_recording(sequence))
     }
 
-    /// Destroys a command buffer that was not submitted. To record it anew is not enough: NVIDIA's driver 580.159 then runs the last copy
-    /// that it held.
+    /// Destroys a command buffer that was not submitted. To reset and record it anew is not enough: NVIDIA's driver 580.159 then runs a
+    /// `vkCmdUpdateBuffer` that it held.
     pub(crate) fn discard(&self, recording: Box<Recording>) {
         self.lock().ring.forget(&recording);
         recording.destroy(&self.gpu);

@@ -4,6 +4,8 @@
 //! submissions that signal one timeline semaphore are a queue of their own. A thread hands them to the real queue one by one, as
 //! their waits and chance allow, and lets the caller run ahead.
 
+#![expect(clippy::disallowed_types, reason = "no lock is taken while another is held")]
+
 use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
 use std::ffi::{CStr, c_char};
@@ -219,66 +221,93 @@ impl Device {
     }
 }
 
+/// Returns the driver's function of a name, if the device has it.
+macro_rules! driver_function {
+    ($look_up:expr, $device:expr, $name:literal, $kind:ty) => {
+        // SAFETY: the device is the caller's; a function of this name has this type, and all have the size of a pointer.
+        unsafe {
+            std::mem::transmute::<vk::PFN_vkVoidFunction, Option<$kind>>($look_up($device, $name.as_ptr()))
+        }
+    };
+}
+
+/// Returns a function of this module for that of the driver.
+macro_rules! own_function {
+    ($own:ident, $kind:ty) => {
+        // SAFETY: all functions have the size of a pointer, and the caller calls this one by its type.
+        Some(unsafe { std::mem::transmute::<$kind, unsafe extern "system" fn()>($own) })
+    };
+}
+
+impl Functions {
+    fn new(look_up: vk::PFN_vkGetDeviceProcAddr, device: vk::Device) -> Option<Self> {
+        Some(Self {
+            look_up,
+            submit: driver_function!(look_up, device, c"vkQueueSubmit2", vk::PFN_vkQueueSubmit2)?,
+            wait_queue: driver_function!(look_up, device, c"vkQueueWaitIdle", vk::PFN_vkQueueWaitIdle)?,
+            wait_device: driver_function!(look_up, device, c"vkDeviceWaitIdle", vk::PFN_vkDeviceWaitIdle)?,
+            get_queue: driver_function!(look_up, device, c"vkGetDeviceQueue", vk::PFN_vkGetDeviceQueue)?,
+            destroy: driver_function!(look_up, device, c"vkDestroyDevice", vk::PFN_vkDestroyDevice)?,
+            begin_label: driver_function!(
+                look_up,
+                device,
+                c"vkQueueBeginDebugUtilsLabelEXT",
+                vk::PFN_vkQueueBeginDebugUtilsLabelEXT
+            ),
+            end_label: driver_function!(
+                look_up,
+                device,
+                c"vkQueueEndDebugUtilsLabelEXT",
+                vk::PFN_vkQueueEndDebugUtilsLabelEXT
+            ),
+            insert_label: driver_function!(
+                look_up,
+                device,
+                c"vkQueueInsertDebugUtilsLabelEXT",
+                vk::PFN_vkQueueInsertDebugUtilsLabelEXT
+            ),
+            present: driver_function!(look_up, device, c"vkQueuePresentKHR", vk::PFN_vkQueuePresentKHR),
+        })
+    }
+}
+
+/// Adds a new device, and starts its thread.
+fn add_device(device: vk::Device, real: Functions, seed: u64) {
+    let state = Mutex::new(State { random: seed | 1, ..State::default() });
+    let made = Arc::new(Device { real, state, has_changed: Condvar::new(), queue_use: Mutex::new(()) });
+    lock(&DEVICES).push((device, Arc::clone(&made)));
+    std::thread::spawn(move || made.run());
+}
+
 /// # Safety
 /// As `vkGetDeviceProcAddr`.
 unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     let known = find_device(device);
     let real = known.as_ref().map(|known| known.real.look_up).or_else(|| REAL.get())?;
-    // SAFETY: the caller's device is passed to the real function. The functions of these names have these types, and all
-    // have the size of a pointer; every device has them.
-    unsafe {
-        macro_rules! real {
-            ($name:literal) => {
-                std::mem::transmute::<unsafe extern "system" fn(), _>(real(device, $name.as_ptr())?)
-            };
+    if known.is_none() {
+        match SEED.get() {
+            Some(seed) => add_device(device, Functions::new(real, device)?, seed),
+            // SAFETY: the caller's device and name are passed on.
+            None => return unsafe { real(device, name) },
         }
-        macro_rules! own {
-            ($own:ident, $type:ty) => {
-                Some(std::mem::transmute::<$type, unsafe extern "system" fn()>($own))
-            };
+    }
+    // SAFETY: the name ends with a zero.
+    match unsafe { CStr::from_ptr(name) }.to_bytes() {
+        b"vkQueueSubmit2" => own_function!(submit, vk::PFN_vkQueueSubmit2),
+        b"vkQueueWaitIdle" => own_function!(wait_queue, vk::PFN_vkQueueWaitIdle),
+        b"vkDeviceWaitIdle" => own_function!(wait_device, vk::PFN_vkDeviceWaitIdle),
+        b"vkGetDeviceQueue" => own_function!(get_queue, vk::PFN_vkGetDeviceQueue),
+        b"vkQueueBeginDebugUtilsLabelEXT" => {
+            own_function!(begin_label, vk::PFN_vkQueueBeginDebugUtilsLabelEXT)
         }
-        let name = CStr::from_ptr(name);
-        macro_rules! optional {
-            ($name:literal) => {
-                real(device, $name.as_ptr())
-                    .map(|found| std::mem::transmute::<unsafe extern "system" fn(), _>(found))
-            };
+        b"vkQueueEndDebugUtilsLabelEXT" => own_function!(end_label, vk::PFN_vkQueueEndDebugUtilsLabelEXT),
+        b"vkQueueInsertDebugUtilsLabelEXT" => {
+            own_function!(insert_label, vk::PFN_vkQueueInsertDebugUtilsLabelEXT)
         }
-        if let Some(seed) = SEED.get()
-            && known.is_none()
-        {
-            let real = Functions {
-                look_up: real,
-                submit: real!(c"vkQueueSubmit2"),
-                wait_queue: real!(c"vkQueueWaitIdle"),
-                wait_device: real!(c"vkDeviceWaitIdle"),
-                get_queue: real!(c"vkGetDeviceQueue"),
-                destroy: real!(c"vkDestroyDevice"),
-                begin_label: optional!(c"vkQueueBeginDebugUtilsLabelEXT"),
-                end_label: optional!(c"vkQueueEndDebugUtilsLabelEXT"),
-                insert_label: optional!(c"vkQueueInsertDebugUtilsLabelEXT"),
-                present: optional!(c"vkQueuePresentKHR"),
-            };
-            let state = Mutex::new(State { random: seed | 1, ..State::default() });
-            let made =
-                Arc::new(Device { real, state, has_changed: Condvar::new(), queue_use: Mutex::new(()) });
-            lock(&DEVICES).push((device, Arc::clone(&made)));
-            std::thread::spawn(move || made.run());
-        } else if known.is_none() {
-            return real(device, name.as_ptr());
-        }
-        match name.to_bytes() {
-            b"vkQueueSubmit2" => own!(submit, vk::PFN_vkQueueSubmit2),
-            b"vkQueueWaitIdle" => own!(wait_queue, vk::PFN_vkQueueWaitIdle),
-            b"vkDeviceWaitIdle" => own!(wait_device, vk::PFN_vkDeviceWaitIdle),
-            b"vkGetDeviceQueue" => own!(get_queue, vk::PFN_vkGetDeviceQueue),
-            b"vkQueueBeginDebugUtilsLabelEXT" => own!(begin_label, vk::PFN_vkQueueBeginDebugUtilsLabelEXT),
-            b"vkQueueEndDebugUtilsLabelEXT" => own!(end_label, vk::PFN_vkQueueEndDebugUtilsLabelEXT),
-            b"vkQueueInsertDebugUtilsLabelEXT" => own!(insert_label, vk::PFN_vkQueueInsertDebugUtilsLabelEXT),
-            b"vkQueuePresentKHR" => own!(present, vk::PFN_vkQueuePresentKHR),
-            b"vkDestroyDevice" => own!(destroy, vk::PFN_vkDestroyDevice),
-            _ => real(device, name.as_ptr()),
-        }
+        b"vkQueuePresentKHR" => own_function!(present, vk::PFN_vkQueuePresentKHR),
+        b"vkDestroyDevice" => own_function!(destroy, vk::PFN_vkDestroyDevice),
+        // SAFETY: the caller's device and name are passed on.
+        _ => unsafe { real(device, name) },
     }
 }
 
@@ -317,12 +346,11 @@ unsafe extern "system" fn submit(
     /// # Safety
     /// As [`std::slice::from_raw_parts`], but no elements may have any address.
     unsafe fn list<T: Copy>(start: *const T, count: u32) -> Vec<T> {
-        // SAFETY: the caller's promise.
         if count == 0 {
-            Vec::new()
-        } else {
-            unsafe { std::slice::from_raw_parts(start, count as usize) }.to_vec()
+            return Vec::new();
         }
+        // SAFETY: the caller's promise.
+        unsafe { std::slice::from_raw_parts(start, count as usize) }.to_vec()
     }
     // SAFETY: the caller passes valid lists.
     let batches = unsafe { list(infos, count) }.into_iter().map(|info| unsafe {

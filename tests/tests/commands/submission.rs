@@ -47,8 +47,8 @@ fn flushing_runs_uploads_and_is_idle_without_any() {
     assert_eq!(read_words(&ctx, *buffer, 4), [3; 4]);
 }
 
-/// The next command buffer of the queue may be the same one of Vulkan. NVIDIA's driver 580 runs the last copy of one that is reset while it
-/// is recorded.
+/// The next command buffer of the queue may be the same one of Vulkan. NVIDIA's driver 580.159 runs a `vkCmdUpdateBuffer` of one that is
+/// reset while it is recorded.
 #[test]
 fn a_dropped_command_buffer_leaves_nothing_to_the_next() {
     let Some(ctx) = device() else { return };

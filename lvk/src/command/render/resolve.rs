@@ -22,7 +22,8 @@ impl CommandBuffer {
     ) -> Result<vk::RenderingAttachmentInfo<'static>> {
         check_resolve(source, to)?;
         if to.texture.kind.is_3d() && !self.shared.gpu.caps.resolves_to_volumes {
-            let reason = "NVIDIA's driver leaves the slice as it is; resolve to a 2D texture and copy it";
+            let reason =
+                "NVIDIA's driver leaves some slices as they are; resolve to a 2D texture and copy it";
             return Err(Error::unsupported(format!("a resolve to a slice of '{}'", to.texture.name), reason));
         }
         self.use_texture(&source.texture, source.subresources(), Use::resolve_source())?;

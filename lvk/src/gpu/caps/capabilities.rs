@@ -100,8 +100,8 @@ pub struct Capabilities {
     /// Arrays written by helper invocations of fragment shaders lose their contents (lavapipe). There, ray
     /// queries in software find no hits in helper invocations.
     pub helpers_lose_arrays: bool,
-    /// Passes resolve samples into slices of volumes. NVIDIA's driver 580.159 leaves the slice as it is, so such passes are refused on NVIDIA's
-    /// driver, whatever its version.
+    /// Passes resolve samples into slices of volumes. NVIDIA's driver 580.159 leaves one of the slices as it is, so such passes are refused on
+    /// NVIDIA's driver, whatever its version.
     pub resolves_to_volumes: bool,
     /// Vendor of the driver (`VkPhysicalDeviceVulkan12Properties::driverID`); 0 below Vulkan 1.2.
     pub driver_id: vk::DriverId,
