@@ -79,8 +79,7 @@ pub(crate) struct CompactedSizeQuery {
     submission: Mutex<Option<QuerySubmission>>,
 }
 
-/// What is known when a query is submitted.
-#[derive(Clone)]
+/// The submission of a size query.
 struct QuerySubmission {
     /// Timeline value at which the results are there.
     value: u64,
@@ -104,11 +103,10 @@ impl CompactedSizeQuery {
     /// Returns the copies to record; `None` until the GPU has written the results. `completed` is the value that it has reached. Availability
     /// alone does not tell: lavapipe also answers queries that are not written yet.
     pub(crate) fn results(&self, completed: u64) -> Result<Option<Vec<PlannedCopy>>> {
-        let submission = self.submission.lock().clone();
-        let Some(QuerySubmission { value, builds }) = submission else { return Ok(None) };
-        if value > completed {
-            return Ok(None);
-        }
+        let builds = match &*self.submission.lock() {
+            Some(submission) if submission.value <= completed => submission.builds.clone(),
+            _ => return Ok(None),
+        };
         let sizes: Option<Vec<_>> = self.pool.values(0, self.pool.count)?.into_iter().collect();
         let Some(sizes) = sizes else { return Ok(None) };
         let copy = |((target, first), builds): (&(Arc<AccelStruct>, u32), u64)| {

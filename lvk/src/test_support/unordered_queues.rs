@@ -384,37 +384,33 @@ unsafe extern "system" fn wait_device(device: vk::Device) -> vk::Result {
     unsafe { (found.real.wait_device)(device) }
 }
 
+/// Calls functions of the driver while no other thread uses a queue.
+fn use_queue(queue: vk::Queue, call: impl FnOnce(&Functions)) {
+    if let Some(device) = device_of(queue) {
+        let _using = lock(&device.queue_use);
+        call(&device.real);
+    }
+}
+
 /// # Safety
 /// As `vkQueueBeginDebugUtilsLabelEXT`.
 unsafe extern "system" fn begin_label(queue: vk::Queue, label: *const vk::DebugUtilsLabelEXT<'_>) {
-    let Some(device) = device_of(queue) else { return };
-    let _using = lock(&device.queue_use);
-    if let Some(begin) = device.real.begin_label {
-        // SAFETY: the caller upholds the contract of `vkQueueBeginDebugUtilsLabelEXT`.
-        unsafe { begin(queue, label) };
-    }
+    // SAFETY: the caller upholds the contract of `vkQueueBeginDebugUtilsLabelEXT`.
+    use_queue(queue, |real| real.begin_label.into_iter().for_each(|begin| unsafe { begin(queue, label) }));
 }
 
 /// # Safety
 /// As `vkQueueEndDebugUtilsLabelEXT`.
 unsafe extern "system" fn end_label(queue: vk::Queue) {
-    let Some(device) = device_of(queue) else { return };
-    let _using = lock(&device.queue_use);
-    if let Some(end) = device.real.end_label {
-        // SAFETY: the caller upholds the contract of `vkQueueEndDebugUtilsLabelEXT`.
-        unsafe { end(queue) };
-    }
+    // SAFETY: the caller upholds the contract of `vkQueueEndDebugUtilsLabelEXT`.
+    use_queue(queue, |real| real.end_label.into_iter().for_each(|end| unsafe { end(queue) }));
 }
 
 /// # Safety
 /// As `vkQueueInsertDebugUtilsLabelEXT`.
 unsafe extern "system" fn insert_label(queue: vk::Queue, label: *const vk::DebugUtilsLabelEXT<'_>) {
-    let Some(device) = device_of(queue) else { return };
-    let _using = lock(&device.queue_use);
-    if let Some(insert) = device.real.insert_label {
-        // SAFETY: the caller upholds the contract of `vkQueueInsertDebugUtilsLabelEXT`.
-        unsafe { insert(queue, label) };
-    }
+    // SAFETY: the caller upholds the contract of `vkQueueInsertDebugUtilsLabelEXT`.
+    use_queue(queue, |real| real.insert_label.into_iter().for_each(|insert| unsafe { insert(queue, label) }));
 }
 
 /// # Safety

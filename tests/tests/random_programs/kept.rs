@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::environment::{Environment, QUEUES};
 use super::op::{Op, parse_program};
-use super::threads::{REPEATS, run_and_check};
+use super::threads::{repeats, run_and_check};
 use super::watchdog::Watchdog;
 
 /// Returns every kept program with the path of its file, in the order of names.
@@ -33,8 +33,8 @@ fn kept_programs_do_what_the_model_says() {
         for queues in QUEUES {
             let Some(env) = Environment::new(queues) else { return };
             for (path, ops) in &programs {
-                let is_threaded = ops.iter().any(|op| op.thread != ops[0].thread);
-                for _ in 0..if is_threaded { REPEATS } else { 1 } {
+                assert!(!ops.is_empty(), "{} has no operations", path.display());
+                for _ in 0..repeats(queues, ops) {
                     let outcome = run_and_check(&env, ops);
                     assert!(outcome.is_ok(), "{}, {queues:?}: {outcome:?}", path.display());
                     dog.program_ended();

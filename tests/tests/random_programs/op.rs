@@ -139,9 +139,8 @@ const RECORDED: [(Kind, u16); 25] = [
     (Kind::TraceRays, 4),
 ];
 
-/// Kinds that record a command, of which `RecordAnyOnThreads` chooses beside those of [`RECORDED`]. Kept programs need this table as it is too.
-/// Traces are chosen more
-/// often than that table says, as few of them hit.
+/// Kinds that record a command, of which `RecordAnyOnThreads` chooses beside those of [`RECORDED`]. Kept programs
+/// need this table as it is too. Traces are chosen more often than that table says, as few of them hit.
 const RECORDED_LATER: [(Kind, u16); 13] = [
     (Kind::DrawIndexed, 4),
     (Kind::DrawIndirect, 4),

@@ -1,11 +1,37 @@
 //! Plans of commands that build acceleration structures and trace rays.
 
-use lvk::{BuildMode, Dependencies, Queue, TlasInstance};
+use lvk::{BuildMode, CommandBuffer, Dependencies, Queue, TlasInstance};
 
+use super::environment::Environment;
 use super::kit::{Kernel, Push};
 use super::memory::{Effect, Instance, RAYS, SLOTS, Shading};
-use super::plan::{Planned, compute_problems};
+use super::plan::{Planned, Words, compute_problems};
 use super::world::{OpenTlas, Problem, World};
+
+/// Records all rays at the TLAS of an index, by the pipeline or by ray queries. They write words of a buffer.
+pub(super) fn record_trace(
+    env: &Environment,
+    cmd: &mut CommandBuffer,
+    to: &Words,
+    index: u32,
+    by_pipeline: bool,
+) -> lvk::Result<()> {
+    let address = env.ctx().buffer_address(to.handle)? + to.offset as u64;
+    let push = Push { to: address, index, ..Default::default() };
+    let writes = Dependencies { buffers: &[to.handle], ..Default::default() };
+    match env.kit.trace().filter(|_| by_pipeline) {
+        Some(pipeline) => {
+            cmd.bind_ray_tracing_pipeline(pipeline)?;
+            cmd.push_constants(&push)?;
+            cmd.trace_rays([RAYS as u32, 1, 1], &writes)
+        }
+        None => {
+            cmd.bind_compute_pipeline(env.kit.kernel(Kernel::Query))?;
+            cmd.push_constants(&push)?;
+            cmd.dispatch([RAYS as u32, 1, 1], &writes)
+        }
+    }
+}
 
 /// Returns the bytes of a triangle of a mesh.
 pub fn triangle_bytes(triangle: usize, depth: u32) -> Vec<u8> {
@@ -181,22 +207,6 @@ impl World<'_> {
         };
         let index = self.tlas[tlas].index;
         let by_pipeline = n[3] & 1 == 1;
-        Some(Planned::new(problems, effects, move |env, cmd| {
-            let address = env.ctx().buffer_address(to.handle)? + to.offset as u64;
-            let push = Push { to: address, index, ..Default::default() };
-            let writes = Dependencies { buffers: &[to.handle], ..Default::default() };
-            match env.kit.trace().filter(|_| by_pipeline) {
-                Some(pipeline) => {
-                    cmd.bind_ray_tracing_pipeline(pipeline)?;
-                    cmd.push_constants(&push)?;
-                    cmd.trace_rays([RAYS as u32, 1, 1], &writes)
-                }
-                None => {
-                    cmd.bind_compute_pipeline(env.kit.kernel(Kernel::Query))?;
-                    cmd.push_constants(&push)?;
-                    cmd.dispatch([RAYS as u32, 1, 1], &writes)
-                }
-            }
-        }))
+        Some(Planned::new(problems, effects, move |env, cmd| record_trace(env, cmd, &to, index, by_pipeline)))
     }
 }

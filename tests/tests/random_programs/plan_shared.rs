@@ -2,15 +2,16 @@
 
 use lvk::{BuildMode, Dependencies, Queue, TextureRegion};
 
-use super::calls::Outcome;
-use super::cell::{compare, pattern};
+use super::calls::{MOST_PENDING, Outcome};
+use super::cell::{Cell, compare, pattern};
 use super::kit::{Kernel, Push};
 use super::memory::{Effect, RAYS, pattern_word};
 use super::op::Kind;
 use super::plan::{Planned, Words, compute_problems};
+use super::plan_rays::record_trace;
 use super::plan_textures::texel;
 use super::shared::{LAYER_BYTES, OwnPart, PART_BYTES, SIDE, answers, instance, layer_part};
-use super::world::{Pending, World, judge};
+use super::world::{Pending, Problem, World, judge};
 
 /// Whole words of a part: the first byte in the part, and their bytes.
 fn words_of_part(offset: u16, length: u16, most: usize) -> (usize, usize) {
@@ -41,7 +42,7 @@ impl World<'_> {
         }))
     }
 
-    /// Copies words of an own buffer to the own part, or back from it or from what nobody writes.
+    /// Copies words of an own buffer to the own part, or back from the own part or from the constant part.
     pub(super) fn copy_shared(&self, n: [u16; 6], is_read: bool) -> Option<Planned> {
         let part = self.part()?;
         let own = self.words(n[0], n[1], n[2], PART_BYTES / 4)?;
@@ -85,7 +86,7 @@ impl World<'_> {
         }))
     }
 
-    /// Copies words of the own part, or of what nobody writes, to an own buffer by a dispatch.
+    /// Copies words of the own part or of the constant part to an own buffer by a dispatch.
     pub(super) fn dispatch_from_shared(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
         let part = self.part()?;
         let to = self.words(n[0], n[1], n[2], PART_BYTES / 4)?;
@@ -187,21 +188,7 @@ impl World<'_> {
         let effects = answers_effect(&to, &problems, 0);
         let by_pipeline = n[2] & 1 == 1;
         Some(Planned::new(problems, effects, move |env, cmd| {
-            let address = env.ctx().buffer_address(to.handle)? + to.offset as u64;
-            let push = Push { to: address, index: env.shared.tlas.index(), ..Default::default() };
-            let writes = Dependencies { buffers: &[to.handle], ..Default::default() };
-            match env.kit.trace().filter(|_| by_pipeline) {
-                Some(pipeline) => {
-                    cmd.bind_ray_tracing_pipeline(pipeline)?;
-                    cmd.push_constants(&push)?;
-                    cmd.trace_rays([RAYS as u32, 1, 1], &writes)
-                }
-                None => {
-                    cmd.bind_compute_pipeline(env.kit.kernel(Kernel::Query))?;
-                    cmd.push_constants(&push)?;
-                    cmd.dispatch([RAYS as u32, 1, 1], &writes)
-                }
-            }
+            record_trace(env, cmd, &to, env.shared.tlas.index(), by_pipeline)
         }))
     }
 
@@ -235,12 +222,8 @@ impl World<'_> {
                 let problems = compute_problems(queue, [to.problem]);
                 let effects = answers_effect(&to, &problems, 1);
                 Planned::new(problems, effects, move |env, cmd| {
-                    let address = env.ctx().buffer_address(to.handle)? + to.offset as u64;
                     cmd.update_tlas(tlas, &[instance(1, replaced.blas)], BuildMode::Rebuild)?;
-                    cmd.bind_compute_pipeline(env.kit.kernel(Kernel::Query))?;
-                    cmd.push_constants(&Push { to: address, index, ..Default::default() })?;
-                    let writes = Dependencies { buffers: &[to.handle], ..Default::default() };
-                    cmd.dispatch([RAYS as u32, 1, 1], &writes)
+                    record_trace(env, cmd, &to, index, false)
                 })
             }
         };
@@ -266,59 +249,52 @@ impl World<'_> {
         Ok(true)
     }
 
-    /// Reads the own part or layer, or what nobody writes, at once or later.
+    /// Reads the own part or layer, or the constant one, at once or later.
     pub(super) fn download_shared(&mut self, n: [u16; 6]) -> Outcome {
         let Some(part) = self.part() else { return Ok(false) };
-        let is_own = !n[0].is_multiple_of(4);
-        let (at, layer) = part.place(is_own);
-        let which = usize::from(!is_own);
-        let (ctx, shared) = (self.ctx(), &self.env.shared);
-        let range = at..at + PART_BYTES as u64;
-        let is_later = n[2].is_multiple_of(2) && self.pending.len() < super::calls::MOST_PENDING;
-        let (expected, readback, bytes) = if n[1].is_multiple_of(2) {
-            let expected = self.memory.buffers[part.bytes[which]].clone();
-            let mut bytes = vec![0; PART_BYTES];
-            match is_later {
-                true => (expected, judge(ctx.read_buffer_later(*shared.buffer, range), &[])?, bytes),
-                false => {
-                    judge(ctx.download_buffer(*shared.buffer, at, &mut bytes), &[])?;
-                    (expected, None, bytes)
-                }
-            }
-        } else {
-            let place = layer_part(part.images[which]).whole(0);
-            let expected = self.memory.images[place.image].read(&place);
-            let region = region_of(layer);
-            match is_later {
-                true => (expected, judge(ctx.read_texture_later(*shared.texture, &region), &[])?, Vec::new()),
-                false => {
-                    let bytes = judge(ctx.download_texture(*shared.texture, &region), &[])?;
-                    (expected, None, bytes.unwrap_or_default())
-                }
-            }
-        };
-        match readback {
-            Some(readback) => self.pending.push(Pending { readback, expected }),
-            None => compare("a part of a shared object", &bytes, &expected)?,
+        let (is_own, is_buffer) = (!n[0].is_multiple_of(4), n[1].is_multiple_of(2));
+        if !n[2].is_multiple_of(2) || self.pending.len() >= MOST_PENDING {
+            return self.compare_part(part, is_own, is_buffer).map(|()| true);
         }
+        let ((at, layer), ctx, shared) = (part.place(is_own), self.ctx(), &self.env.shared);
+        let readback = match is_buffer {
+            true => ctx.read_buffer_later(*shared.buffer, at..at + PART_BYTES as u64),
+            false => ctx.read_texture_later(*shared.texture, &region_of(layer)),
+        };
+        let expected = self.expected_part(part, is_own, is_buffer);
+        self.pending.extend(judge(readback, &[])?.map(|readback| Pending { readback, expected }));
         Ok(true)
     }
 
     /// Compares the own part and layer at the end of the program.
-    pub(super) fn compare_part(&self) -> Result<(), String> {
+    pub(super) fn compare_own_part(&self) -> Result<(), String> {
         let Some(part) = self.part() else { return Ok(()) };
-        let (at, layer) = part.place(true);
-        let mut bytes = vec![0; PART_BYTES];
-        judge(self.ctx().download_buffer(*self.env.shared.buffer, at, &mut bytes), &[])?;
-        compare("the part of the shared buffer at the end", &bytes, &self.memory.buffers[part.bytes[0]])?;
-        let texels = self.ctx().download_texture(*self.env.shared.texture, &region_of(layer));
-        let place = layer_part(part.images[0]).whole(0);
-        let expected = self.memory.images[place.image].read(&place);
-        compare(
-            "the layer of the shared texture at the end",
-            &judge(texels, &[])?.unwrap_or_default(),
-            &expected,
-        )
+        [true, false].into_iter().try_for_each(|is_buffer| self.compare_part(part, true, is_buffer))
+    }
+
+    /// Reads a part of the buffer, or a layer of the texture, and compares it with the model.
+    fn compare_part(&self, part: &OwnPart<'_>, is_own: bool, is_buffer: bool) -> Result<(), String> {
+        let ((at, layer), ctx, shared) = (part.place(is_own), self.ctx(), &self.env.shared);
+        let found = match is_buffer {
+            true => {
+                let mut bytes = vec![0; PART_BYTES];
+                ctx.download_buffer(*shared.buffer, at, &mut bytes).map(|()| bytes)
+            }
+            false => ctx.download_texture(*shared.texture, &region_of(layer)),
+        };
+        let expected = self.expected_part(part, is_own, is_buffer);
+        let what = if is_buffer { "a part of the shared buffer" } else { "a layer of the shared texture" };
+        compare(what, &judge(found, &[])?.unwrap_or_default(), &expected)
+    }
+
+    /// Returns what the model expects there.
+    fn expected_part(&self, part: &OwnPart<'_>, is_own: bool, is_buffer: bool) -> Vec<Cell> {
+        let which = usize::from(!is_own);
+        if is_buffer {
+            return self.memory.buffers[part.bytes[which]].clone();
+        }
+        let place = layer_part(part.images[which]).whole(0);
+        self.memory.images[place.image].read(&place)
     }
 
     /// Destroys the objects that are replaced, and makes them anew.
@@ -327,7 +303,8 @@ impl World<'_> {
     }
 }
 
-fn answers_effect(to: &Words, problems: &[super::world::Problem], which: usize) -> Vec<Effect> {
+/// Returns the effect of rays that meet one instance alone.
+fn answers_effect(to: &Words, problems: &[Problem], which: usize) -> Vec<Effect> {
     let answer = |buffer| Effect::Bytes { buffer, offset: to.offset, bytes: answers(which) };
     to.number.filter(|_| problems.is_empty()).map(answer).into_iter().collect()
 }

@@ -356,7 +356,7 @@ impl World<'_> {
                 compare(&format!("mip {mip} of texture {number} at the end"), &bytes, &expected)?;
             }
         }
-        self.compare_part()?;
+        self.compare_own_part()?;
         judge(self.ctx().set_profiling(false), &[])?;
         let (env, tally) = (self.env, Tally { hits: self.memory.hits, ..std::mem::take(&mut self.tally) });
         drop(self);

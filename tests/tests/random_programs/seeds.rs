@@ -25,6 +25,7 @@ const LOWERED_SEEDS: u64 = 60;
 const MOST_TRIED: u64 = 60;
 /// Programs after which objects and memory are counted.
 const CHECKED_EVERY: u64 = 16;
+
 /// Runs the programs of seeds one after the other. Returns what they have done.
 ///
 /// # Panics

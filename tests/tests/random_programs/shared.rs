@@ -1,7 +1,7 @@
 //! Objects that all threads use at once.
 //!
-//! A buffer and a texture have a part for each program that runs, which that program alone writes, and one that nobody
-//! writes. All programs build one BLAS and one TLAS anew, always of the same triangles, and trace rays at the TLAS. Other
+//! A buffer and a texture have a part for each program that runs, which that program alone writes, and a
+//! constant one. All programs build one BLAS and one TLAS anew, always of the same triangles, and trace rays at the TLAS. Other
 //! objects are destroyed by any program and made anew with the same contents, while the others use them.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -25,7 +25,7 @@ pub const PART_BYTES: usize = 256;
 pub const SIDE: u32 = 4;
 /// Bytes of a layer.
 pub const LAYER_BYTES: usize = 4 * (SIDE * SIDE) as usize;
-/// Seed of what nobody writes, in the shared objects and in those that are replaced.
+/// Seed of the constant parts, and of the objects that are replaced.
 const CONSTANT: [u16; 2] = [11, 47];
 /// Depths of the triangles of the shared BLAS and of the one that is replaced.
 const DEPTHS: [[u32; TRIANGLES]; 2] = [[3, 8, 5], [7, 2, 9]];
@@ -70,7 +70,7 @@ pub struct OwnPart<'a> {
     pub view: Holder<TextureHandle>,
     /// Gets instances of the BLAS that is replaced.
     pub tlas: Holder<AccelStructHandle>,
-    /// Numbers of the bytes in the model: those of the part, those that nobody writes, and those of the buffer that is
+    /// Numbers of the bytes in the model: those of the own part, of the constant part and of the buffer that is
     /// replaced.
     pub bytes: [usize; 3],
     /// Numbers of the images in the model, likewise.
@@ -238,7 +238,7 @@ pub fn layer_part(image: usize) -> Part {
 }
 
 impl OwnPart<'_> {
-    /// Returns the first byte and the layer of the own part, or of the one that nobody writes.
+    /// Returns the first byte and the layer of the own part, or of the constant one.
     pub fn place(&self, is_own: bool) -> (u64, u32) {
         let number = if is_own { self.number } else { PARTS };
         ((number * PART_BYTES) as u64, number as u32)

@@ -8,10 +8,16 @@ use super::run::{Failure, run};
 use super::shrink::shrink;
 use super::watchdog::Watchdog;
 
-/// Runs of a program on several threads, whose failure may depend on timing.
-pub const REPEATS: usize = 5;
+/// Runs of a program whose failure may depend on timing.
+const REPEATS: usize = 5;
 /// Most programs that are tried while a failing one is shrunk.
 pub const TRIES: usize = 400;
+
+/// Returns how often to run a program: several times if it has several threads, or queues in a random order.
+pub fn repeats(queues: Queues, ops: &[Op]) -> usize {
+    let is_threaded = ops.iter().any(|op| op.thread != ops[0].thread);
+    if is_threaded || queues == Queues::Unordered { REPEATS } else { 1 }
+}
 
 /// Runs the operations of each thread as a program of its own, all at once on one context, and checks that nothing is
 /// left.
@@ -47,11 +53,9 @@ struct Candidates<'a> {
 }
 
 impl Candidates<'_> {
-    /// Runs a program, several times if it has several threads.
+    /// Runs a program, several times if its failure may depend on timing.
     fn run(&mut self, ops: &[Op]) -> Result<(), Failure> {
-        let is_threaded = ops.iter().any(|op| op.thread != ops[0].thread);
-        let depends_on_time = is_threaded || self.queues == Queues::Unordered;
-        for _ in 0..if depends_on_time { REPEATS } else { 1 } {
+        for _ in 0..repeats(self.queues, ops) {
             self.dog.program_ended();
             let Some(env) = self.env.take().or_else(|| Environment::new(self.queues)) else { return Ok(()) };
             run_and_check(&env, ops)?;
