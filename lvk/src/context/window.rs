@@ -362,7 +362,7 @@ impl PresentBackend for LiveBackend<'_> {
     fn acquire(&mut self) -> Result<Acquired, Failure> {
         let submitter = &self.ctx.device_state().submitter;
         // Only the graphics queue uses images of windows, so background work of other queues delays nothing.
-        let completed = submitter.timeline(0).query_completed()?;
+        let completed = submitter.completed_of(0)?;
         self.resources.destroy_finished(completed)?;
         let Some(current) = &self.resources.current else { return Err(Failure::OutOfDate) };
         let (chain, ids) = (Arc::clone(&current.chain), current.ids());

@@ -2,6 +2,7 @@
 
 mod batches;
 pub(crate) mod command_pool;
+mod completion;
 pub(crate) mod deferred_free;
 pub(crate) mod emit_barriers;
 pub(crate) mod exchanged_layout;
@@ -23,6 +24,7 @@ pub(crate) mod scope_tree;
 pub(crate) mod timeline;
 #[cfg(feature = "tracy")]
 mod tracy_zones;
+mod unheard;
 
 pub(crate) use queue::{Finished, Submission, Submitter};
 pub(crate) use recording::Recording;

@@ -14,11 +14,11 @@ use super::presentable::{AcquireWait, Presentables};
 use super::queue_sync::{OwnershipRelease, QueueCaps, QueueSync, SubmitPlan, SubmitRequest};
 use super::recording::{Recording, begin_commands, end_commands};
 use super::timeline::Timeline;
+use super::unheard::Unheard;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::device_loss::DeviceLossReport;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::caps::queues::IdleFailure;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
 
@@ -58,17 +58,19 @@ impl SubmitValues {
 /// The queues, with all state that changes at a submission. `T` is the type of items that are destroyed later.
 pub(crate) struct Submitter<T> {
     /// One timeline for each hardware queue: a single one, or one for every queue of the library.
-    timelines: Vec<Timeline>,
+    pub(super) timelines: Vec<Timeline>,
     inner: Mutex<SubmitterState<T>>,
     /// True once a submission has used external semaphores.
-    uses_external_semaphores: AtomicBool,
+    pub(super) uses_external_semaphores: AtomicBool,
     /// The report of the lost device.
     loss: OnceLock<Arc<DeviceLossReport>>,
-    gpu: Arc<Gpu>,
+    pub(super) gpu: Arc<Gpu>,
 }
 
-struct SubmitterState<T> {
-    queue_sync: QueueSync,
+pub(super) struct SubmitterState<T> {
+    pub(super) queue_sync: QueueSync,
+    /// Values that the validation layer has not heard of.
+    pub(super) unheard: Unheard,
     /// Contents of the next submission. Empty between submissions.
     batches: Batches,
     presentables: Presentables,
@@ -109,6 +111,7 @@ impl<T> Submitter<T> {
             stages: Queue::ALL.map(stages_of)[queue_index],
         };
         let inner = SubmitterState {
+            unheard: Unheard::default(),
             queue_sync: QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], has_several),
             batches: Batches::default(),
             presentables: Presentables::default(),
@@ -358,6 +361,7 @@ impl<T> Submitter<T> {
         }
         inner.batches.clear();
         inner.queue_sync.mark_submitted(queue_index, value);
+        inner.unheard.push(&self.gpu, queue_index, value);
         self.timelines[queue_index].mark_submitted(value);
         Ok(())
     }
@@ -393,14 +397,6 @@ impl<T> Submitter<T> {
         &self.loss
     }
 
-    pub(super) fn gpu(&self) -> &Gpu {
-        &self.gpu
-    }
-
-    pub(super) fn timeline_count(&self) -> usize {
-        self.timelines.len()
-    }
-
     /// Returns the number of values used so far.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn value_count(&self) -> u64 {
@@ -415,57 +411,6 @@ impl<T> Submitter<T> {
     /// Returns the timeline of a queue.
     pub(crate) fn timeline(&self, queue_index: usize) -> &Timeline {
         &self.timelines[queue_index.min(self.timelines.len() - 1)]
-    }
-
-    /// Blocks until the submission of this value is done.
-    pub(crate) fn wait(&self, value: u64) -> Result<()> {
-        self.explain_loss(self.timeline(self.queue_of(value)).wait(value))
-    }
-
-    /// Blocks until the submissions of all these values are done.
-    pub(crate) fn wait_for_queues(&self, values: &PerQueue<u64>) -> Result<()> {
-        let mut timelines = self.timelines.iter().zip(values);
-        self.explain_loss(timelines.try_for_each(|(timeline, value)| timeline.wait(*value)))
-    }
-
-    /// Waits until the driver no longer uses the external semaphores of submissions that are done. Mesa's queue thread
-    /// uses the semaphores that a submission waited for after the submission has signalled its own.
-    pub(crate) fn wait_for_semaphores(&self) -> Result<()> {
-        if self.uses_external_semaphores.load(Ordering::Relaxed) {
-            let idle = self.gpu.queues.wait_idle(&self.gpu.device);
-            self.explain_loss(idle.map_err(IdleFailure::into_error))?;
-        }
-        Ok(())
-    }
-
-    /// Returns true if the submission of this value is done.
-    pub(crate) fn is_done(&self, value: u64) -> Result<bool> {
-        Ok(self.explain_loss(self.timeline(self.queue_of(value)).query_completed())? >= value)
-    }
-
-    /// Returns true if all submissions of all queues are done.
-    pub(crate) fn is_all_done(&self) -> Result<bool> {
-        for timeline in &self.timelines {
-            if !self.explain_loss(timeline.is_done())? {
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    /// Returns the value up to which all submissions are done.
-    pub(crate) fn completed_up_to(&self) -> Result<u64> {
-        let completed = self.completed_values()?;
-        Ok(self.lock().queue_sync.completed_up_to(&completed))
-    }
-
-    /// Queries the completed values of the queues.
-    fn completed_values(&self) -> Result<PerQueue<u64>> {
-        let mut completed = [0; QUEUE_COUNT];
-        for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
-            *completed = self.explain_loss(timeline.query_completed())?;
-        }
-        Ok(completed)
     }
 
     /// Destroys `item` once no command buffer can use it any more. Returns the number of waiting items.
@@ -496,10 +441,7 @@ impl<T> Submitter<T> {
     /// Collects finished work like [`collect`](Self::collect), but only what is known without a query: at least all
     /// values that were waited for.
     pub(crate) fn collect_known(&self) -> Finished<T> {
-        let mut completed = [0; QUEUE_COUNT];
-        for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
-            *completed = timeline.last_seen();
-        }
+        let completed = self.last_seen();
         self.lock().take_finished(&completed)
     }
 
@@ -536,7 +478,7 @@ impl<T> Submitter<T> {
         inner.deferred.drain_all()
     }
 
-    fn lock(&self) -> Guard<'_, SubmitterState<T>> {
+    pub(super) fn lock(&self) -> Guard<'_, SubmitterState<T>> {
         self.inner.lock()
     }
 }

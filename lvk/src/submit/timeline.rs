@@ -73,9 +73,9 @@ impl Timeline {
         Ok(value)
     }
 
-    /// Returns true if all submitted work is done.
-    pub(crate) fn is_done(&self) -> Result<bool> {
-        Ok(self.query_completed()? >= self.sent.load(Ordering::Acquire))
+    /// Returns the last value whose work a queue accepted.
+    pub(crate) fn last_submitted(&self) -> u64 {
+        self.sent.load(Ordering::Acquire)
     }
 
     /// Returns the value that the GPU of a lost device has reached, as far as it is known. A value beyond `submitted`
@@ -89,17 +89,24 @@ impl Timeline {
 
     /// Blocks until the GPU reaches `value`.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
-        if self.last_seen() >= value {
-            return Ok(());
+        if self.last_seen() < value {
+            cpu_scope!("vkWaitSemaphores");
+            self.reaches(value, u64::MAX)?;
         }
-        cpu_scope!("vkWaitSemaphores");
+        Ok(())
+    }
+
+    /// Blocks until the GPU reaches `value`, at most for a time in nanoseconds. Returns whether it does.
+    pub(crate) fn reaches(&self, value: u64, timeout_ns: u64) -> Result<bool> {
         let (semaphores, values) = ([self.raw], [value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore is alive and a timeline; `value` was submitted, so the wait ends.
-        unsafe { self.gpu.device.wait_semaphores(&info, u64::MAX) }
-            .map_err(Error::vulkan("vkWaitSemaphores", self.name))?;
-        self.seen.fetch_max(value, Ordering::AcqRel);
-        Ok(())
+        match unsafe { self.gpu.device.wait_semaphores(&info, timeout_ns) } {
+            Ok(()) => self.seen.fetch_max(value, Ordering::AcqRel),
+            Err(vk::Result::TIMEOUT) => return Ok(false),
+            Err(error) => return Err(Error::vulkan("vkWaitSemaphores", self.name)(error)),
+        };
+        Ok(true)
     }
 }
 
