@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use lvk::ash::{Entry, vk};
-use lvk::test_hooks::with_unordered_queues;
+use lvk::test_hooks::{observe_values_once, with_unordered_queues};
 use lvk::{
     Context, ContextDesc, Error, QueueRequest, RayQueryRequest, RayTracingPipelineRequest, ValidationMode,
     ValidationSink,
@@ -160,6 +160,7 @@ fn validation() -> ValidationMode {
 /// # Panics
 /// When there is no driver.
 pub fn vulkan() -> Option<Option<&'static Path>> {
+    observe_values_once();
     match loader() {
         Ok(loader) => Some(loader.library.as_deref()),
         Err(reason) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {

@@ -16,11 +16,6 @@ impl Gpu {
         self.debug_utils.is_some()
     }
 
-    /// True if the validation layer or a debugger follows the calls, as far as the library knows.
-    pub(crate) fn is_watched(&self) -> bool {
-        self.instance.validated || self.names_objects()
-    }
-
     /// Names an object for the validation layer and debuggers, if a tool reads names.
     pub(crate) fn name<H: vk::Handle>(&self, object: H, name: &str) {
         let Some(ext) = &self.debug_utils else { return };

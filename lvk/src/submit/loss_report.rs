@@ -43,7 +43,7 @@ impl<T> Submitter<T> {
     /// Returns the error with the report of the first loss, which later calls repeat.
     fn loss_error(&self, ring: &CommandRing, last: &PerQueue<u64>, report: &DeviceLossReport) -> Error {
         let complete = || {
-            let fault = report.fault.clone().or_else(|| self.gpu.query_fault());
+            let fault = report.fault.clone().or_else(|| self.gpu().query_fault());
             let queues = self.unfinished_queues(ring, last);
             Arc::new(DeviceLossReport { call: report.call, object: report.object.clone(), fault, queues })
         };
@@ -51,12 +51,12 @@ impl<T> Submitter<T> {
     }
 
     fn unfinished_queues(&self, ring: &CommandRing, last: &PerQueue<u64>) -> Vec<QueueLossReport> {
-        let queues = Queue::ALL.into_iter().take(self.timelines.len().min(QUEUE_COUNT));
+        let queues = Queue::ALL.into_iter().take(self.timelines().len().min(QUEUE_COUNT));
         let report = |queue: Queue| {
             let (queue_index, submitted) = (queue.index(), last[queue.index()]);
             let completed = self.timeline(queue_index).last_known(submitted);
             let recordings: Vec<_> = ring.unfinished(queue_index, completed).collect();
-            let unfinished = unfinished_commands(&recordings, self.gpu.passed_checkpoints(queue_index));
+            let unfinished = unfinished_commands(&recordings, self.gpu().passed_checkpoints(queue_index));
             QueueLossReport { queue, completed, submitted, unfinished }
         };
         queues.map(report).filter(|queue| !queue.unfinished.is_empty()).collect()

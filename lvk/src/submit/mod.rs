@@ -24,7 +24,7 @@ pub(crate) mod scope_tree;
 pub(crate) mod timeline;
 #[cfg(feature = "tracy")]
 mod tracy_zones;
-mod unheard;
+mod unobserved;
 
 pub(crate) use queue::{Finished, Submission, Submitter};
 pub(crate) use recording::Recording;

@@ -14,7 +14,7 @@ use super::presentable::{AcquireWait, Presentables};
 use super::queue_sync::{OwnershipRelease, QueueCaps, QueueSync, SubmitPlan, SubmitRequest};
 use super::recording::{Recording, begin_commands, end_commands};
 use super::timeline::Timeline;
-use super::unheard::Unheard;
+use super::unobserved::Unobserved;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::device_loss::DeviceLossReport;
 use crate::error::{Error, Result};
@@ -58,19 +58,21 @@ impl SubmitValues {
 /// The queues, with all state that changes at a submission. `T` is the type of items that are destroyed later.
 pub(crate) struct Submitter<T> {
     /// One timeline for each hardware queue: a single one, or one for every queue of the library.
-    pub(super) timelines: Vec<Timeline>,
+    timelines: Vec<Timeline>,
     inner: Mutex<SubmitterState<T>>,
     /// True once a submission has used external semaphores.
-    pub(super) uses_external_semaphores: AtomicBool,
+    uses_external_semaphores: AtomicBool,
+    /// True if the host observes each timeline value once, those of all queues together: the validation layer relies on it.
+    observes_in_order: bool,
     /// The report of the lost device.
     loss: OnceLock<Arc<DeviceLossReport>>,
-    pub(super) gpu: Arc<Gpu>,
+    gpu: Arc<Gpu>,
 }
 
-pub(super) struct SubmitterState<T> {
-    pub(super) queue_sync: QueueSync,
-    /// Values that the validation layer has not heard of.
-    pub(super) unheard: Unheard,
+struct SubmitterState<T> {
+    queue_sync: QueueSync,
+    /// Empty if the host observes values in any order.
+    unobserved: Unobserved,
     /// Contents of the next submission. Empty between submissions.
     batches: Batches,
     presentables: Presentables,
@@ -111,8 +113,8 @@ impl<T> Submitter<T> {
             stages: Queue::ALL.map(stages_of)[queue_index],
         };
         let inner = SubmitterState {
-            unheard: Unheard::default(),
             queue_sync: QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], has_several),
+            unobserved: Unobserved::default(),
             batches: Batches::default(),
             presentables: Presentables::default(),
             graphics_only: IdMap::default(),
@@ -122,8 +124,15 @@ impl<T> Submitter<T> {
             broken: None,
         };
         let inner = Mutex::new(Rank::Submitter, inner);
-        let uses_external_semaphores = AtomicBool::new(false);
-        Ok(Self { timelines, inner, uses_external_semaphores, loss: OnceLock::new(), gpu: Arc::clone(gpu) })
+        Ok(Self {
+            timelines,
+            inner,
+            uses_external_semaphores: AtomicBool::new(false),
+            observes_in_order: gpu.instance.validated
+                && (gpu.queues.has_several_raw() || observes_one_queue()),
+            loss: OnceLock::new(),
+            gpu: Arc::clone(gpu),
+        })
     }
 
     /// Starts recording a command buffer.
@@ -361,7 +370,9 @@ impl<T> Submitter<T> {
         }
         inner.batches.clear();
         inner.queue_sync.mark_submitted(queue_index, value);
-        inner.unheard.push(&self.gpu, queue_index, value);
+        if self.observes_in_order {
+            inner.unobserved.push(queue_index, value);
+        }
         self.timelines[queue_index].mark_submitted(value);
         Ok(())
     }
@@ -395,6 +406,33 @@ impl<T> Submitter<T> {
 
     pub(crate) fn loss(&self) -> &OnceLock<Arc<DeviceLossReport>> {
         &self.loss
+    }
+
+    pub(super) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    pub(super) fn timelines(&self) -> &[Timeline] {
+        &self.timelines
+    }
+
+    pub(super) fn uses_external_semaphores(&self) -> bool {
+        self.uses_external_semaphores.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn observes_in_order(&self) -> bool {
+        self.observes_in_order
+    }
+
+    /// Calls `with` while nothing is submitted.
+    pub(super) fn with_unobserved<R>(&self, with: impl FnOnce(&mut Unobserved) -> R) -> R {
+        with(&mut self.lock().unobserved)
+    }
+
+    /// Returns the value up to which all submissions are done.
+    pub(crate) fn completed_up_to(&self) -> Result<u64> {
+        let completed = self.completed_values()?;
+        Ok(self.lock().queue_sync.completed_up_to(&completed))
     }
 
     /// Returns the number of values used so far.
@@ -478,7 +516,7 @@ impl<T> Submitter<T> {
         inner.deferred.drain_all()
     }
 
-    pub(super) fn lock(&self) -> Guard<'_, SubmitterState<T>> {
+    fn lock(&self) -> Guard<'_, SubmitterState<T>> {
         self.inner.lock()
     }
 }
@@ -546,6 +584,14 @@ impl<T> SubmitterState<T> {
             self.foreground[part.map_or(0, |part| part.queue_index)] = last;
         }
     }
+}
+
+/// True if contexts with one Vulkan queue observe values in order too, as tests request it.
+fn observes_one_queue() -> bool {
+    #[cfg(any(test, feature = "test-hooks"))]
+    return crate::test_support::hooks::observes_one_queue();
+    #[cfg(not(any(test, feature = "test-hooks")))]
+    return false;
 }
 
 /// Returns the stages that command buffers of a queue support.

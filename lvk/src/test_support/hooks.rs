@@ -2,6 +2,8 @@
 
 #![allow(missing_docs, reason = "only tests see it")]
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use ash::vk;
 
 use crate::context::Context;
@@ -30,6 +32,18 @@ pub fn null_command_context(desc: &ContextDesc<'_>) -> Result<Context> {
 /// device. Contexts of [`with_fault_injection`] have none.
 pub fn with_unordered_queues<T>(seed: u64, make: impl FnOnce() -> T) -> T {
     crate::test_support::unordered_queues::with_unordered_queues(seed, make)
+}
+
+static OBSERVES_ONE_QUEUE: AtomicBool = AtomicBool::new(false);
+
+/// From now on, the host observes each timeline value once where a context has the validation layer, with one Vulkan queue too: synchronization
+/// validation then finds hazards of work that the host has asked for.
+pub fn observe_values_once() {
+    OBSERVES_ONE_QUEUE.store(true, Ordering::Relaxed);
+}
+
+pub(crate) fn observes_one_queue() -> bool {
+    OBSERVES_ONE_QUEUE.load(Ordering::Relaxed)
 }
 
 /// Returns the number of live parts that graphics pipelines are linked from.

@@ -95,6 +95,18 @@ fn cpu_builds_are_timed_phase_by_phase_for_each_number_of_threads() {
 }
 
 #[test]
+fn blas_of_low_memory_are_built_by_the_same_phases() {
+    let [usual, low] = [&[][..], &["--low-memory"]].map(|flags| {
+        let table = table(&[&["builds", "--quick", "--threads", "1,2"], flags].concat());
+        assert_positive(&table, "encoding", 0..2);
+        assert!(table.contains("all builds made the same bytes"), "{table}");
+        let bytes = table.lines().find_map(|line| line.strip_prefix("- bytes of the BLAS: "));
+        number(bytes.unwrap_or_else(|| panic!("{table}")))
+    });
+    assert!(low < 0.6 * usual, "{low} of {usual} bytes");
+}
+
+#[test]
 #[ignore = "needs Embree: .ci/slow embree"]
 fn builds_are_compared_with_those_of_embree() {
     let library = std::env::var("LVK_EMBREE").unwrap();
@@ -441,6 +453,20 @@ fn cpu_overhead_is_compared_with_its_limits() {
         assert!(number(&row(&table, counted)[0]) < 1.0, "{table}");
     }
     assert!(table.contains("60 ms") && !table.contains("NaN"), "{table}");
+}
+
+#[test]
+fn the_core_is_measured_with_one_queue_too() {
+    let table = table(&["core", "--quick", "--single-queue"]);
+    for name in [
+        "push constants + draw",
+        "dispatch after",
+        "frame of one dispatch: command buffer",
+        "empty submission",
+    ] {
+        assert_positive(&table, name, 0..2);
+    }
+    assert!(!table.contains("NaN"), "{table}");
 }
 
 #[test]

@@ -154,13 +154,18 @@ impl Engine {
 
     /// A mapped buffer with an address.
     pub(super) fn buffer(&self) -> (vk::Buffer, vk::DeviceMemory) {
+        self.buffer_of(BYTES)
+    }
+
+    /// As [`buffer`](Self::buffer), of some bytes.
+    pub(super) fn buffer_of(&self, bytes: u64) -> (vk::Buffer, vk::DeviceMemory) {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
         // SAFETY: as above.
         unsafe {
-            let info = vk::BufferCreateInfo::default().size(BYTES).usage(usage);
+            let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
             let buffer = self.device.create_buffer(&info, None).unwrap();
             let wish = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
             let needed = self.device.get_buffer_memory_requirements(buffer);

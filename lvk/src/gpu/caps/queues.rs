@@ -188,6 +188,11 @@ impl Queues {
         self.is_separate.contains(&true)
     }
 
+    /// True if there is more than one Vulkan queue.
+    pub(crate) fn has_several_raw(&self) -> bool {
+        self.raw.len() > 1
+    }
+
     /// Locks the Vulkan queue of a queue index, which only one thread may use at a time.
     pub(crate) fn raw(&self, queue_index: usize) -> Guard<'_, vk::Queue> {
         self.raw[self.raw_index[queue_index]].lock()
