@@ -16,6 +16,9 @@ pub(crate) struct CommandRing {
     /// Sequence numbers of command buffers that were never submitted, but have staging memory. Kept until the next
     /// collection.
     discarded: Vec<u64>,
+    /// Command buffers whose submission failed. The driver may run a part of them all the same.
+    #[expect(clippy::vec_box, reason = "handed on as pointers")]
+    failed: Vec<Box<Recording>>,
     last_sequence: u64,
 }
 
@@ -100,6 +103,12 @@ impl CommandRing {
         self.queues[recording.queue_index].in_flight.push_back(recording);
     }
 
+    /// Keeps a command buffer whose submission failed, with its staging memory, until all are destroyed.
+    pub(crate) fn keep_failed(&mut self, recording: Box<Recording>) {
+        self.end_recording(recording.sequence);
+        self.failed.push(recording);
+    }
+
     /// Forgets a command buffer that was never submitted. The caller destroys it.
     pub(crate) fn forget(&mut self, recording: &Recording) {
         self.end_recording(recording.sequence);
@@ -148,5 +157,6 @@ impl CommandRing {
             let all = begun.take().into_iter().chain(free.drain(..)).chain(in_flight.drain(..));
             all.for_each(|recording| recording.destroy(gpu));
         }
+        self.failed.drain(..).for_each(|recording| recording.destroy(gpu));
     }
 }

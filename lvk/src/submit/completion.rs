@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use super::last_access::{PerQueue, QUEUE_COUNT};
 use super::queue::Submitter;
+use super::unobserved::Progress;
 use crate::error::Result;
 use crate::gpu::caps::queues::IdleFailure;
 
-/// Longest wait for a value that holds the lock of submissions, in nanoseconds. It is not zero: a wait without a timeout
-/// need not report a lost device.
+/// Longest wait for a value that holds the lock of submissions, in nanoseconds.
 const LOCKED_WAIT_NS: u64 = 10_000;
 /// Pause between two such waits, for other threads to submit.
 const PAUSE: Duration = Duration::from_micros(20);
@@ -31,8 +31,11 @@ impl<T> Submitter<T> {
             return timeline.wait(value);
         }
         while timeline.last_seen() < value {
-            self.observe(LOCKED_WAIT_NS)?;
-            std::thread::sleep(PAUSE);
+            match self.observe(LOCKED_WAIT_NS)? {
+                Progress::None => return timeline.wait(value),
+                Progress::Some if timeline.last_seen() < value => std::thread::sleep(PAUSE),
+                Progress::Some => {}
+            }
         }
         Ok(())
     }
@@ -76,8 +79,10 @@ impl<T> Submitter<T> {
         if !self.observes_in_order() {
             return self.explain_loss(timeline.query_completed());
         }
-        if timeline.last_seen() < timeline.last_submitted() {
-            self.explain_loss(self.observe(0))?;
+        if timeline.last_seen() < timeline.last_submitted()
+            && self.explain_loss(self.observe(0))? == Progress::None
+        {
+            return self.explain_loss(timeline.query_completed());
         }
         Ok(timeline.last_seen())
     }
@@ -92,8 +97,15 @@ impl<T> Submitter<T> {
     }
 
     /// Observes all values that the queues have reached, and waits up to `timeout_ns` for each that follows.
-    fn observe(&self, timeout_ns: u64) -> Result<()> {
-        let reaches = |queue_index, value| self.timeline(queue_index).reaches(value, timeout_ns);
-        self.with_unobserved(|unobserved| unobserved.observe(reaches))
+    ///
+    /// Without progress the caller asks in another way, whatever the validation layer makes of it: a wait that ends by its
+    /// timeout need not tell of a lost device.
+    fn observe(&self, timeout_ns: u64) -> Result<Progress> {
+        self.with_unobserved(|unobserved| {
+            unobserved.observe(|queue_index, value| {
+                let timeline = self.timeline(queue_index);
+                if timeline.last_seen() >= value { Ok(true) } else { timeline.reaches(value, timeout_ns) }
+            })
+        })
     }
 }

@@ -227,8 +227,7 @@ impl<T> Submitter<T> {
             Ok(last) => inner.record_submission(&submission, *last),
             Err(error) => inner.broken = Some(error.clone()),
         }
-        let mut put_away =
-            |part: Option<Box<Recording>>| part.map_or(0, |part| inner.file_recording(&self.gpu, part));
+        let mut put_away = |part: Option<Box<Recording>>| part.map_or(0, |part| inner.file_recording(part));
         let values = SubmitValues { prelude: put_away(submission.prelude), main: put_away(submission.main) };
         (values, sent.map(drop))
     }
@@ -325,7 +324,7 @@ impl<T> Submitter<T> {
         recording.labels.set_name("ownership transfer");
         let sent = self.record_transfers(inner, release, &recording, images);
         recording.value = if sent.is_ok() { release.value } else { 0 };
-        inner.file_recording(&self.gpu, recording);
+        inner.file_recording(recording);
         sent
     }
 
@@ -536,14 +535,13 @@ impl<T> SubmitterState<T> {
         self.ring.take_ticket(queue_index)
     }
 
-    /// Stores a submitted command buffer until its queue is done with it, or destroys one that was not submitted. Returns its value.
-    fn file_recording(&mut self, gpu: &Gpu, recording: Box<Recording>) -> u64 {
+    /// Stores a command buffer until its queue is done with it, or for good if its submission failed. Returns its value.
+    fn file_recording(&mut self, recording: Box<Recording>) -> u64 {
         let value = recording.value;
         if value > 0 {
             self.ring.mark_submitted(recording);
         } else {
-            self.ring.forget(&recording);
-            recording.destroy(gpu);
+            self.ring.keep_failed(recording);
         }
         value
     }

@@ -87,20 +87,23 @@ impl Timeline {
         if value > submitted { seen } else { value.max(seen) }
     }
 
-    /// Blocks until the GPU reaches `value`.
+    /// Blocks until the GPU reaches `value`, which was submitted.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
-        if self.last_seen() < value {
-            cpu_scope!("vkWaitSemaphores");
-            self.reaches(value, u64::MAX)?;
+        if self.last_seen() >= value {
+            return Ok(());
         }
-        Ok(())
+        cpu_scope!("vkWaitSemaphores");
+        if self.reaches(value, u64::MAX)? {
+            return Ok(());
+        }
+        Err(Error::vulkan("vkWaitSemaphores", self.name)(vk::Result::TIMEOUT))
     }
 
-    /// Blocks until the GPU reaches `value`, at most for a time in nanoseconds. Returns whether it does.
+    /// Blocks until the GPU reaches `value`, at most for `timeout_ns` nanoseconds. Returns whether it does.
     pub(crate) fn reaches(&self, value: u64, timeout_ns: u64) -> Result<bool> {
         let (semaphores, values) = ([self.raw], [value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-        // SAFETY: the semaphore is alive and a timeline; `value` was submitted, so the wait ends.
+        // SAFETY: the semaphore is alive and a timeline.
         match unsafe { self.gpu.device.wait_semaphores(&info, timeout_ns) } {
             Ok(()) => self.seen.fetch_max(value, Ordering::AcqRel),
             Err(vk::Result::TIMEOUT) => return Ok(false),

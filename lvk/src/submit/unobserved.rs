@@ -1,6 +1,7 @@
 //! Timeline values that the host has not observed, where the validation layer must learn of each in order.
 
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 
 use super::last_access::PerQueue;
 use crate::error::Result;
@@ -14,20 +15,39 @@ use crate::error::Result;
 /// So it misses hazards, and reports others that are none. It does neither if the host observes each value once, those of
 /// all queues together, and no submission comes between (`docs/drivers.md` has the programs that show it).
 #[derive(Debug, Default)]
-pub(super) struct Unobserved(PerQueue<VecDeque<u64>>);
+pub(super) struct Unobserved {
+    values: PerQueue<VecDeque<u64>>,
+    /// Time of the first question since the last that found a value.
+    idle_since: Option<Instant>,
+}
+
+/// Answer of [`Unobserved::observe`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Progress {
+    /// A value was observed, or the last one not long ago.
+    Some,
+    /// Questions have found no value for [`LONGEST_IDLE`].
+    None,
+}
+
+/// Time without a new value after which the device may be lost.
+const LONGEST_IDLE: Duration = Duration::from_secs(2);
 
 impl Unobserved {
     /// Records a submitted value.
     pub(super) fn push(&mut self, queue_index: usize, value: u64) {
-        self.0[queue_index].push_back(value);
+        self.values[queue_index].push_back(value);
     }
 
     /// Observes all values that the queues have reached. `reaches` asks whether a queue has reached a value.
-    pub(super) fn observe(&mut self, mut reaches: impl FnMut(usize, u64) -> Result<bool>) -> Result<()> {
-        let mut is_new = true;
+    pub(super) fn observe(
+        &mut self,
+        mut reaches: impl FnMut(usize, u64) -> Result<bool>,
+    ) -> Result<Progress> {
+        let (mut found, mut is_new) = (false, true);
         // Work that a queue waited for is done too, maybe on a queue that was asked before.
         while std::mem::take(&mut is_new) {
-            for (queue_index, values) in self.0.iter_mut().enumerate() {
+            for (queue_index, values) in self.values.iter_mut().enumerate() {
                 while let Some(value) = values.front()
                     && reaches(queue_index, *value)?
                 {
@@ -35,8 +55,14 @@ impl Unobserved {
                     is_new = true;
                 }
             }
+            found |= is_new;
         }
-        Ok(())
+        if found || self.values.iter().all(VecDeque::is_empty) {
+            self.idle_since = None;
+            return Ok(Progress::Some);
+        }
+        let idle = self.idle_since.get_or_insert_with(Instant::now).elapsed();
+        Ok(if idle < LONGEST_IDLE { Progress::Some } else { Progress::None })
     }
 }
 
@@ -53,6 +79,19 @@ mod tests {
         prop::collection::vec(work, 1..20)
     }
 
+    #[test]
+    fn a_value_that_is_never_reached_ends_the_progress() {
+        let mut unobserved = Unobserved::default();
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Some, "nothing is submitted");
+        unobserved.push(1, 4);
+        unobserved.push(1, 7);
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Some);
+        unobserved.idle_since = Instant::now().checked_sub(LONGEST_IDLE);
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::None);
+        assert_eq!(unobserved.observe(|_, value| Ok(value == 4)).unwrap(), Progress::Some);
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Some);
+    }
+
     proptest! {
         /// While queues go on between the questions, no value is observed twice, and none without what precedes it.
         #[test]
@@ -62,7 +101,7 @@ mod tests {
         ) {
             let mut unobserved = Unobserved::default();
             for (place, (queue_index, _)) in works.iter().enumerate() {
-                unobserved.0[*queue_index].push_back(place as u64);
+                unobserved.values[*queue_index].push_back(place as u64);
             }
             let queue_of = |place: usize| works[place].0;
             let waits_for = |place: usize| -> Vec<usize> {

@@ -1,10 +1,16 @@
 //! Fault injection: devices that can refuse a submission or an allocation, to test the library's error handling.
 
+#![expect(clippy::disallowed_types, reason = "no lock is taken while another is held")]
+
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char};
+use std::sync::{Mutex, PoisonError};
 
 use ash::vk;
+
+/// The driver's waits for semaphores, by device: any thread may wait.
+static WAITS: Mutex<Vec<(vk::Device, vk::PFN_vkWaitSemaphores)>> = Mutex::new(Vec::new());
 
 thread_local! {
     static INJECT_FAULTS: Cell<bool> = const { Cell::new(false) };
@@ -14,6 +20,9 @@ thread_local! {
     static SUBMITS_LEFT: Cell<Option<u32>> = const { Cell::new(None) };
     /// The result of that submission.
     static FAILURE: Cell<vk::Result> = const { Cell::new(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) };
+    /// True if the device runs the submission that fails.
+    static RUNS_REFUSED: Cell<bool> = const { Cell::new(false) };
+    static TIMES_OUT: Cell<bool> = const { Cell::new(false) };
     static ALLOCATE: Cell<Option<vk::PFN_vkAllocateMemory>> = const { Cell::new(None) };
     static IS_OUT_OF_MEMORY: Cell<bool> = const { Cell::new(false) };
     static FREE: Cell<Option<vk::PFN_vkFreeMemory>> = const { Cell::new(None) };
@@ -41,6 +50,17 @@ pub(crate) fn injects_faults() -> bool {
 pub(crate) fn fail_after(submissions: u32, failure: vk::Result) {
     SUBMITS_LEFT.set(Some(submissions));
     FAILURE.set(failure);
+    RUNS_REFUSED.set(false);
+}
+
+/// Lets the device run the submission that [`fail_after`] makes fail.
+pub(crate) fn run_refused() {
+    RUNS_REFUSED.set(true);
+}
+
+/// Makes all waits of this thread for semaphores end by their timeout, or succeed again.
+pub(crate) fn set_times_out(times_out: bool) {
+    TIMES_OUT.set(times_out);
 }
 
 /// Makes all allocations of device memory by this thread fail, or succeed again.
@@ -81,6 +101,14 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
         if name == c"vkQueueSubmit2" {
             SUBMIT.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkQueueSubmit2>>(found));
             return Some(std::mem::transmute::<vk::PFN_vkQueueSubmit2, unsafe extern "system" fn()>(submit));
+        }
+        if name == c"vkWaitSemaphores" {
+            let found =
+                std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkWaitSemaphores>>(found)?;
+            let mut waits = WAITS.lock().unwrap_or_else(PoisonError::into_inner);
+            waits.retain(|(other, _)| *other != device);
+            waits.push((device, found));
+            return Some(std::mem::transmute::<vk::PFN_vkWaitSemaphores, unsafe extern "system" fn()>(wait));
         }
         if name == c"vkFreeMemory" {
             FREE.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkFreeMemory>>(found));
@@ -145,9 +173,28 @@ unsafe extern "system" fn submit(
 ) -> vk::Result {
     let submits_left = SUBMITS_LEFT.get();
     SUBMITS_LEFT.set(submits_left.and_then(|submits_left| submits_left.checked_sub(1)));
-    match SUBMIT.get() {
+    let is_refused = submits_left == Some(0);
+    let result = match SUBMIT.get() {
         // SAFETY: the caller upholds the contract of `vkQueueSubmit2`.
-        Some(real) if submits_left != Some(0) => unsafe { real(queue, count, infos, fence) },
+        Some(real) if !is_refused || RUNS_REFUSED.get() => unsafe { real(queue, count, infos, fence) },
         _ => FAILURE.get(),
+    };
+    if is_refused { FAILURE.get() } else { result }
+}
+
+/// # Safety
+/// As `vkWaitSemaphores`, of a device that this thread or another has created by [`with_failing_device`].
+unsafe extern "system" fn wait(
+    device: vk::Device,
+    info: *const vk::SemaphoreWaitInfo<'_>,
+    timeout_ns: u64,
+) -> vk::Result {
+    let waits = WAITS.lock().unwrap_or_else(PoisonError::into_inner);
+    let real = waits.iter().find(|(other, _)| *other == device).map(|(_, real)| *real);
+    drop(waits);
+    match real {
+        // SAFETY: the caller upholds the contract of `vkWaitSemaphores`.
+        Some(real) if !TIMES_OUT.get() => unsafe { real(device, info, timeout_ns) },
+        _ => vk::Result::TIMEOUT,
     }
 }

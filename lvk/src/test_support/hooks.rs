@@ -62,6 +62,18 @@ pub fn fail_submission_after(submissions: u32) {
     fault_injection::fail_after(submissions, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
 }
 
+/// As [`fail_submission_after`], but the device runs the submission all the same.
+pub fn refuse_and_run_submission_after(submissions: u32) {
+    fail_submission_after(submissions);
+    fault_injection::run_refused();
+}
+
+/// Makes all waits of this thread for the GPU end by a timeout, or succeed again. The context must be created by
+/// [`with_fault_injection`].
+pub fn set_waits_time_out(times_out: bool) {
+    fault_injection::set_times_out(times_out);
+}
+
 /// As [`fail_submission_after`], but the submission reports that the device is lost. It is not: the GPU runs what was
 /// submitted before.
 pub fn lose_device_after(submissions: u32) {

@@ -179,6 +179,13 @@ impl Device {
     fn run(&self) {
         let mut state = lock(&self.state);
         loop {
+            if !state.is_empty() {
+                // Others may come meanwhile, and be chosen.
+                let pause = state.random(2 * LONGEST_PAUSE).saturating_sub(LONGEST_PAUSE);
+                drop(state);
+                std::thread::sleep(Duration::from_micros(pause));
+                state = lock(&self.state);
+            }
             let Some(held) = state.take() else {
                 if state.has_ended {
                     return;
@@ -187,9 +194,7 @@ impl Device {
                 continue;
             };
             state.is_busy = true;
-            let pause = state.random(2 * LONGEST_PAUSE).saturating_sub(LONGEST_PAUSE);
             drop(state);
-            std::thread::sleep(Duration::from_micros(pause));
             let result = self.submit(&held);
             if result != vk::Result::SUCCESS {
                 // The caller has its answer already, and would wait for ever.
@@ -208,7 +213,7 @@ impl Device {
     fn submit(&self, held: &Held) -> vk::Result {
         let infos: Vec<_> = held.batches.iter().map(Batch::info).collect();
         let _using = lock(&self.queue_use);
-        // SAFETY: the caller has submitted these; calls of other threads wait for this one to end.
+        // SAFETY: the caller has submitted these; calls of other threads to functions that this module replaces wait for this one to end.
         unsafe { (self.real.submit)(held.queue, infos.len() as u32, infos.as_ptr(), held.fence) }
     }
 

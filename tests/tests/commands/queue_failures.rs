@@ -7,7 +7,10 @@ use std::sync::mpsc::channel;
 use std::thread::spawn;
 use std::time::Duration;
 
-use lvk::test_hooks::{fail_submission_after, waiting_objects, with_fault_injection};
+use lvk::test_hooks::{
+    fail_submission_after, refuse_and_run_submission_after, set_waits_time_out, waiting_objects,
+    with_fault_injection,
+};
 use lvk::{Context, Error, Queue, SubmitHandle, TextureDesc, TextureUsage};
 use lvk_tests::compute::words_buffer;
 use lvk_tests::queues::{REQUESTS, WORDS, submit_on};
@@ -103,5 +106,36 @@ fn an_image_that_left_its_queue_is_kept_until_it_is_done() {
         ends(ctx, Context::wait_idle);
         drop(image);
         assert_eq!(waiting_objects(ctx).unwrap(), 0);
+    });
+}
+
+/// A driver may run a part of what it refuses: its command buffers are kept until the GPU is done.
+#[test]
+fn command_buffers_of_a_refused_submission_may_run() {
+    each(|ctx| {
+        let words = words_buffer(ctx, &[7; 1 << 24]);
+        ctx.wait_idle().unwrap();
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        cmd.fill_buffer(*words, 0, 4 << 24, 1).unwrap();
+        refuse_and_run_submission_after(0);
+        refused(ctx.submit(cmd));
+        ends(ctx, Context::wait_idle);
+        // The words live until the end of the context, as what the refused commands use has no value to wait for.
+        std::mem::forget(words);
+    });
+}
+
+/// No driver ends a wait without a limit by a timeout. If one did, the work would not be done.
+#[test]
+fn a_wait_that_times_out_is_an_error() {
+    each(|ctx| {
+        let words = words_buffer(ctx, &[7; WORDS]);
+        let submission = submit_on(ctx, Queue::Graphics, |cmd| cmd.fill_buffer(*words, 0, 256, 1).unwrap());
+        set_waits_time_out(true);
+        let waited = ctx.wait(submission);
+        set_waits_time_out(false);
+        let Err(Error::Vulkan { call, result, .. }) = waited else { unreachable!("{waited:?}") };
+        assert_eq!((call, result), ("vkWaitSemaphores", lvk::ash::vk::Result::TIMEOUT));
+        ctx.wait(submission).unwrap();
     });
 }
