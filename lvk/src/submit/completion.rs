@@ -32,9 +32,9 @@ impl<T> Submitter<T> {
         }
         while timeline.last_seen() < value {
             match self.observe(LOCKED_WAIT_NS)? {
-                Progress::None => return timeline.wait(value),
-                Progress::Some if timeline.last_seen() < value => std::thread::sleep(PAUSE),
-                Progress::Some => {}
+                Progress::Stalled => return timeline.wait(value),
+                Progress::Recent if timeline.last_seen() < value => std::thread::sleep(PAUSE),
+                Progress::Recent => {}
             }
         }
         Ok(())
@@ -80,7 +80,7 @@ impl<T> Submitter<T> {
             return self.explain_loss(timeline.query_completed());
         }
         if timeline.last_seen() < timeline.last_submitted()
-            && self.explain_loss(self.observe(0))? == Progress::None
+            && self.explain_loss(self.observe(0))? == Progress::Stalled
         {
             return self.explain_loss(timeline.query_completed());
         }

@@ -24,10 +24,10 @@ pub(super) struct Unobserved {
 /// Answer of [`Unobserved::observe`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Progress {
-    /// A value was observed, or the last one not long ago.
-    Some,
-    /// Questions have found no value for [`LONGEST_IDLE`].
-    None,
+    /// A value was observed within [`LONGEST_IDLE`], or none is left.
+    Recent,
+    /// Questions have found no value for longer.
+    Stalled,
 }
 
 /// Time without a new value after which the device may be lost.
@@ -59,10 +59,10 @@ impl Unobserved {
         }
         if found || self.values.iter().all(VecDeque::is_empty) {
             self.idle_since = None;
-            return Ok(Progress::Some);
+            return Ok(Progress::Recent);
         }
         let idle = self.idle_since.get_or_insert_with(Instant::now).elapsed();
-        Ok(if idle < LONGEST_IDLE { Progress::Some } else { Progress::None })
+        Ok(if idle < LONGEST_IDLE { Progress::Recent } else { Progress::Stalled })
     }
 }
 
@@ -82,14 +82,14 @@ mod tests {
     #[test]
     fn a_value_that_is_never_reached_ends_the_progress() {
         let mut unobserved = Unobserved::default();
-        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Some, "nothing is submitted");
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Recent, "nothing is submitted");
         unobserved.push(1, 4);
         unobserved.push(1, 7);
-        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Some);
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Recent);
         unobserved.idle_since = Instant::now().checked_sub(LONGEST_IDLE);
-        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::None);
-        assert_eq!(unobserved.observe(|_, value| Ok(value == 4)).unwrap(), Progress::Some);
-        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Some);
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Stalled);
+        assert_eq!(unobserved.observe(|_, value| Ok(value == 4)).unwrap(), Progress::Recent);
+        assert_eq!(unobserved.observe(|_, _| Ok(false)).unwrap(), Progress::Recent);
     }
 
     proptest! {

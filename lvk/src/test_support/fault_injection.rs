@@ -110,6 +110,13 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
             waits.push((device, found));
             return Some(std::mem::transmute::<vk::PFN_vkWaitSemaphores, unsafe extern "system" fn()>(wait));
         }
+        if name == c"vkGetDeviceFaultInfoEXT" && found.is_some() {
+            return Some(
+                std::mem::transmute::<vk::PFN_vkGetDeviceFaultInfoEXT, unsafe extern "system" fn()>(
+                    find_no_fault,
+                ),
+            );
+        }
         if name == c"vkFreeMemory" {
             FREE.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkFreeMemory>>(found));
             return Some(std::mem::transmute::<vk::PFN_vkFreeMemory, unsafe extern "system" fn()>(free));
@@ -197,4 +204,16 @@ unsafe extern "system" fn wait(
         Some(real) if !TIMES_OUT.get() => unsafe { real(device, info, timeout_ns) },
         _ => vk::Result::TIMEOUT,
     }
+}
+
+/// A device that only seems lost has no fault, and must not be asked for one.
+///
+/// # Safety
+/// As `vkGetDeviceFaultInfoEXT`.
+unsafe extern "system" fn find_no_fault(
+    _: vk::Device,
+    _: *mut vk::DeviceFaultCountsEXT<'_>,
+    _: *mut vk::DeviceFaultInfoEXT<'_>,
+) -> vk::Result {
+    vk::Result::ERROR_OUT_OF_HOST_MEMORY
 }
