@@ -1,4 +1,4 @@
-//! What the host knows of finished submissions: waits, and questions for timeline values.
+//! Waits for submissions, and queries of the timeline values that the queues have completed.
 
 use std::time::Duration;
 

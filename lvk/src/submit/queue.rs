@@ -14,7 +14,7 @@ use super::presentable::{AcquireWait, Presentables};
 use super::queue_sync::{OwnershipRelease, QueueCaps, QueueSync, SubmitPlan, SubmitRequest};
 use super::recording::{Recording, begin_commands, end_commands};
 use super::timeline::Timeline;
-use super::unobserved::Unobserved;
+use super::unobserved::{Unobserved, must_observe_in_order};
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::device_loss::DeviceLossReport;
 use crate::error::{Error, Result};
@@ -62,7 +62,7 @@ pub(crate) struct Submitter<T> {
     inner: Mutex<SubmitterState<T>>,
     /// True once a submission has used external semaphores.
     uses_external_semaphores: AtomicBool,
-    /// True if the host observes each timeline value once, those of all queues together: the validation layer relies on it.
+    /// True if the host observes each timeline value once, those of all queues together.
     observes_in_order: bool,
     /// The report of the lost device.
     loss: OnceLock<Arc<DeviceLossReport>>,
@@ -128,8 +128,7 @@ impl<T> Submitter<T> {
             timelines,
             inner,
             uses_external_semaphores: AtomicBool::new(false),
-            observes_in_order: gpu.instance.validated
-                && (gpu.queues.has_several_raw() || observes_one_queue()),
+            observes_in_order: must_observe_in_order(gpu),
             loss: OnceLock::new(),
             gpu: Arc::clone(gpu),
         })
@@ -582,14 +581,6 @@ impl<T> SubmitterState<T> {
             self.foreground[part.map_or(0, |part| part.queue_index)] = last;
         }
     }
-}
-
-/// True if contexts with one Vulkan queue observe values in order too, as tests request it.
-fn observes_one_queue() -> bool {
-    #[cfg(any(test, feature = "test-hooks"))]
-    return crate::test_support::hooks::observes_one_queue();
-    #[cfg(not(any(test, feature = "test-hooks")))]
-    return false;
 }
 
 /// Returns the stages that command buffers of a queue support.

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::last_access::PerQueue;
 use crate::error::Result;
+use crate::gpu::Gpu;
 
 /// Submitted timeline values that the host has not observed, of each queue and in rising order.
 ///
@@ -32,6 +33,15 @@ pub(super) enum Progress {
 
 /// Time without a new value after which the device may be lost.
 const LONGEST_IDLE: Duration = Duration::from_secs(2);
+
+/// True if the host must observe values in order: the validation layer is on and sees several queues, or tests request it.
+pub(super) fn must_observe_in_order(gpu: &Gpu) -> bool {
+    #[cfg(any(test, feature = "test-hooks"))]
+    let with_one_queue = crate::test_support::hooks::observes_one_queue();
+    #[cfg(not(any(test, feature = "test-hooks")))]
+    let with_one_queue = false;
+    gpu.instance.validated && (gpu.queues.has_several_raw() || with_one_queue)
+}
 
 impl Unobserved {
     /// Records a submitted value.

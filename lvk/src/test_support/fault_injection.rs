@@ -22,6 +22,7 @@ thread_local! {
     static FAILURE: Cell<vk::Result> = const { Cell::new(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) };
     /// True if the device runs the submission that fails.
     static RUNS_REFUSED: Cell<bool> = const { Cell::new(false) };
+    /// True if waits of this thread end by their timeout.
     static TIMES_OUT: Cell<bool> = const { Cell::new(false) };
     static ALLOCATE: Cell<Option<vk::PFN_vkAllocateMemory>> = const { Cell::new(None) };
     static IS_OUT_OF_MEMORY: Cell<bool> = const { Cell::new(false) };

@@ -4,7 +4,10 @@
 use std::ffi::CStr;
 
 use lvk::ash::{self, vk};
-use lvk::{Context, ContextDesc, FeatureSet, OptionalFeature, RawContext};
+use lvk::{
+    BufferHandle, BufferUsage, Context, ContextDesc, FeatureSet, Holder, ImportedBuffer, OptionalFeature,
+    RawContext,
+};
 use lvk_tests::guest_engine::GuestInstance;
 
 /// Width and height of its images.
@@ -101,8 +104,25 @@ impl Engine {
     }
 
     pub(super) fn context(&self) -> Context {
+        self.context_with(&ContextDesc::default())
+    }
+
+    pub(super) fn context_with(&self, desc: &ContextDesc<'_>) -> Context {
         // SAFETY: all of it belongs together, every feature is on, and the engine outlives the context in every test.
-        unsafe { Context::from_raw(self.raw(), &ContextDesc::default()).unwrap() }
+        unsafe { Context::from_raw(self.raw(), desc).unwrap() }
+    }
+
+    /// Imports a buffer of the engine, which lives on.
+    pub(super) fn import(&self, ctx: &Context, buffer: vk::Buffer) -> Holder<BufferHandle> {
+        let imported = ImportedBuffer {
+            buffer,
+            size_bytes: BYTES,
+            usage: BufferUsage::STORAGE,
+            concurrent: false,
+            debug_name: "the engine's buffer",
+        };
+        // SAFETY: `buffer` made it as described.
+        unsafe { ctx.import_buffer(&imported).unwrap() }
     }
 
     pub(super) fn memory(

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::ash::{self, vk};
-use lvk::{BufferDesc, BufferUsage, Context, ContextDesc, ImportedBuffer, ValidationMode};
+use lvk::{BufferDesc, ContextDesc, ValidationMode};
 
 use super::engine::{BYTES, Engine};
 
@@ -19,18 +19,9 @@ fn questions_of_the_host_hide_no_hazard() {
         return eprintln!("NOT TESTED without the validation layer");
     }
     let desc = ContextDesc { validation: ValidationMode::Standard, ..ContextDesc::default() };
-    // SAFETY: as of `Engine::context`.
-    let ctx = unsafe { Context::from_raw(engine.raw(), &desc).unwrap() };
+    let ctx = engine.context_with(&desc);
     let (buffer, memory) = engine.buffer();
-    let imported = ImportedBuffer {
-        buffer,
-        size_bytes: BYTES,
-        usage: BufferUsage::STORAGE,
-        concurrent: false,
-        debug_name: "the engine's buffer",
-    };
-    // SAFETY: the buffer is as described, and lives on.
-    let words = unsafe { ctx.import_buffer(&imported).unwrap() };
+    let words = engine.import(&ctx, buffer);
     let many = ctx.create_buffer(&BufferDesc { size_bytes: MANY, ..Default::default() }).unwrap();
     let both_asked_in_time = (0..ROUNDS).any(|_| {
         let mut cmd = ctx.acquire_command_buffer().unwrap();
@@ -53,12 +44,7 @@ fn questions_of_the_host_hide_no_hazard() {
     assert!(messages.len() == 1 && messages[0].contains("WRITE_AFTER_WRITE"), "{messages:?}");
     ctx.wait_idle().unwrap();
     drop((words, many, ctx));
-    // SAFETY: the engine's own, once each, after all work is done.
-    unsafe {
-        engine.device.device_wait_idle().unwrap();
-        engine.device.destroy_buffer(buffer, None);
-        engine.device.free_memory(memory, None);
-    }
+    engine.destroy(&[], vk::Image::null(), &[buffer], &[memory]);
 }
 
 /// The defect of the layer that the library works around. If the layer reports the hazard, the work-around is of no use any more.
@@ -83,11 +69,5 @@ fn the_layer_takes_pending_work_as_finished() {
     assert_eq!(value, 1, "the device is too fast for {MANY} bytes");
     engine.submit(engine.queue, &[], &[(timeline, 3)], |commands| fill(commands, buffer, 3));
     assert_eq!(engine.instance.take_messages(), [""; 0]);
-    // SAFETY: the engine's own, once each, after all work is done.
-    unsafe {
-        engine.device.device_wait_idle().unwrap();
-        engine.device.destroy_semaphore(timeline, None);
-        [buffer, many].into_iter().for_each(|buffer| engine.device.destroy_buffer(buffer, None));
-        [memory, memory_of_many].into_iter().for_each(|memory| engine.device.free_memory(memory, None));
-    }
+    engine.destroy(&[timeline], vk::Image::null(), &[buffer, many], &[memory, memory_of_many]);
 }

@@ -16,7 +16,7 @@ use lvk::{
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::raster::{pixels, run_pass, staged_pipeline};
 
-use super::engine::{ALL, BYTES, Engine, LOCAL_READ, SIDE};
+use super::engine::{ALL, Engine, LOCAL_READ, SIDE};
 
 fn texture_desc() -> TextureDesc<'static> {
     TextureDesc {
@@ -38,23 +38,12 @@ const ADD_ONE: &str = "
         words.at[i] = textureBindlessFetchU2D(texture, ivec2(i % 4, i / 4), 0).x + 1 + i;
     }";
 
-/// Imports the engine's image and buffer.
-fn import_both(
-    ctx: &Context,
-    image: vk::Image,
-    buffer: vk::Buffer,
-) -> (Holder<TextureHandle>, Holder<BufferHandle>) {
+/// Imports the engine's image.
+fn import_image(ctx: &Context, image: vk::Image) -> Holder<TextureHandle> {
     let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
     let texture = ImportedTexture { image, desc: texture_desc(), layout, concurrent: false };
-    let words = ImportedBuffer {
-        buffer,
-        size_bytes: BYTES,
-        usage: BufferUsage::STORAGE,
-        concurrent: false,
-        debug_name: "the engine's buffer",
-    };
-    // SAFETY: the handles are as described and live on.
-    unsafe { (ctx.import_texture(&texture).unwrap(), ctx.import_buffer(&words).unwrap()) }
+    // SAFETY: the image is as described, and lives on.
+    unsafe { ctx.import_texture(&texture).unwrap() }
 }
 
 /// Records a dispatch that reads the texture and writes the words, and the release of the texture to the engine.
@@ -87,7 +76,7 @@ fn images_buffers_and_semaphores_are_exported_and_imported() {
         assert!(ctx.capabilities().has(OptionalFeature::FullDrawIndex));
         let has_cube_arrays = ctx.capabilities().has(OptionalFeature::CubeArrays);
         assert!(!has_cube_arrays, "the engine did not list it as enabled");
-        let (texture, words) = import_both(&ctx, image, buffer);
+        let (texture, words) = (import_image(&ctx, image), engine.import(&ctx, buffer));
         let pipeline = compute_pipeline(&ctx, ADD_ONE);
         for (round, word) in [(1, 100), (2, 7000)] {
             ctx.with_raw_queue(|queue| {
@@ -183,8 +172,7 @@ fn a_guest_receives_the_messages_of_the_layer() {
     let validation_sink = Some(sink.clone());
     let desc =
         ContextDesc { validation: ValidationMode::Standard, validation_sink, ..ContextDesc::default() };
-    // SAFETY: as of `Engine::context`.
-    let (ctx, silent) = unsafe { (Context::from_raw(engine.raw(), &desc).unwrap(), engine.context()) };
+    let (ctx, silent) = (engine.context_with(&desc), engine.context());
     let ext = ash::ext::debug_utils::Instance::new(&engine.instance.entry, &engine.instance.raw);
     let data = vk::DebugUtilsMessengerCallbackDataEXT::default().message(c"spoken by the engine");
     let (severity, kind) =
