@@ -1,4 +1,4 @@
-// What a ray does at a triangle that may have holes: masks, coverage and thin glass.
+// What a ray does at a triangle that may have holes: masks, coverage, thin glass, and backs that the eye does not see.
 #ifndef VIEWER_CANDIDATE
 #define VIEWER_CANDIDATE
 
@@ -13,10 +13,18 @@ bool passesThrough(Hit hit, vec3 direction, inout Payload payload) {
     Instance instance = frame.instances.at[hit.instance];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + hit.geometry];
     uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
+    uint flags = frame.materials.at[geometry.material].flags;
+    bool isFromEye = payload.seed != kShadow && (payload.seed & kFromEye) != 0u;
+    if (isFromEye && (flags & kSingleSided) != 0u && dot(outwards(instance, geometry, corners), direction) > 0.0) {
+        return true;
+    }
+    bool isPaneToShadows = payload.seed == kShadow && frame.materials.at[geometry.material].transmission > 0.0;
+    if ((flags & (kAlphaMask | kAlphaBlend)) == 0u && !isPaneToShadows) {
+        return false;
+    }
     AttributesArray all = AttributesArray(geometry.attributes);
     vec3 weights = weightsOf(hit.barycentrics);
     Texcoords texcoords = texcoordsOf(all, corners, weights);
-    uint flags = frame.materials.at[geometry.material].flags;
     vec4 color = baseColorOf(geometry.material, all, corners, weights, texcoords, 0.0);
     if ((flags & kAlphaMask) != 0u && color.a < frame.materials.at[geometry.material].alphaCutoff) {
         return true;
@@ -27,7 +35,7 @@ bool passesThrough(Hit hit, vec3 direction, inout Payload payload) {
         return covered < 1.0 && unitFloat(place) >= covered;
     }
     vec3 through = vec3(0.0);
-    if (frame.materials.at[geometry.material].transmission > 0.0) {
+    if (isPaneToShadows) {
         // The same normal as where the path itself goes through.
         Surface surface = surfaceAt(hit, direction, 0.0);
         through = isPane(surface) ? paneTransmittance(surface, direction) : vec3(0.0);

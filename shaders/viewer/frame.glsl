@@ -13,6 +13,7 @@ const uint kQuantised = 1u; // positions are four signed normalised numbers of 1
 // Bits of Material.flags.
 const uint kAlphaMask = 1u; // holes where alpha is below the cutoff
 const uint kAlphaBlend = 2u; // alpha is the share of light that meets the surface
+const uint kSingleSided = 4u; // the eye does not see its back
 const uint kUnlit = 8u;
 const uint kTangents = 32u; // the surface has a direction: a normal map or anisotropy
 const uint kThin = 16u; // light that passes keeps its direction: there is no volume behind the surface

@@ -19,10 +19,20 @@ struct Hit {
 struct Payload {
     Hit hit;
     vec3 transmittance; // of what lies on the way of a shadow ray
-    uint seed; // of a ray that looks for the nearest surface; kShadow for a shadow ray
+    uint seed; // of a ray that looks for the nearest surface, below kFromEye; with it for a ray from the eye; kShadow for a shadow ray
 };
 
 const uint kShadow = 0xffffffffu;
+const uint kFromEye = 0x40000000u;
+
+// The seed of a ray that looks for the nearest surface. The eye does not see the back of single-sided surfaces.
+uint nearestSeed(uint random, bool isFromEye) {
+    return random >> 2 | (isFromEye ? kFromEye : 0u);
+}
+
+uint nearestFlags(uint seed) {
+    return (seed & kFromEye) != 0u ? LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES : LVK_RAY_FLAG_NONE;
+}
 
 struct Triangle {
     uvec3 corners;
@@ -56,6 +66,12 @@ vec3 vectorToWorld(Instance instance, vec3 v) {
 
 vec3 normalToWorld(Instance instance, vec3 n) {
     return instance.normalColumns[0] * n.x + instance.normalColumns[1] * n.y + instance.normalColumns[2] * n.z;
+}
+
+// A normal of a triangle on its front, of any length. The front is where the triangle turns counter-clockwise, before instances mirror it.
+vec3 outwards(Instance instance, Geometry geometry, uvec3 corners) {
+    vec3 a = positionOf(geometry, corners.x);
+    return normalToWorld(instance, cross(positionOf(geometry, corners.y) - a, positionOf(geometry, corners.z) - a));
 }
 
 vec3 weightsOf(vec2 barycentrics) {

@@ -85,7 +85,8 @@ void storePath(uint place, Path path, Random random) {
 // The next surface on the way of a path, up to `range` away; at that distance where there is none.
 Hit nextHit(inout Path path, float range, Random random) {
     path.rayCount += 1u;
-    return traceWithin(path.origin, path.direction, range, hashWords(random.seed + path.bounce, random.number));
+    uint seed = nearestSeed(hashWords(random.seed + path.bounce, random.number), path.bounce == 0u);
+    return traceWithin(path.origin, path.direction, range, seed);
 }
 
 // The surface at a hit. The path loses what the volume before it takes.

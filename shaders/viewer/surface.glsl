@@ -188,9 +188,7 @@ Surface surfaceAt(Hit hit, vec3 direction, float width) {
     surface.position = weights.x * a + weights.y * b + weights.z * c;
     // Mirroring instances turn triangles over; their normals tell the front.
     vec3 across = cross(b - a, c - a);
-    vec3 outwards = normalToWorld(instance, cross(positionOf(geometry, corners.y) - positionOf(geometry, corners.x),
-                                                  positionOf(geometry, corners.z) - positionOf(geometry, corners.x)));
-    across = dot(across, outwards) < 0.0 ? -across : across;
+    across = dot(across, outwards(instance, geometry, corners)) < 0.0 ? -across : across;
     float area = length(across);
     vec3 front = area > 0.0 ? across / area : -direction;
     surface.isFront = dot(front, direction) < 0.0;

@@ -6,11 +6,11 @@
 
 layout(location = 0) rayPayloadEXT Payload payload;
 
-// The nearest surface up to `range` away, at the distance `range` where there is none.
+// The nearest surface up to `range` away, at the distance `range` where there is none. `seed`: of nearestSeed().
 Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed) {
-    payload.seed = seed == kShadow ? 0u : seed;
+    payload.seed = seed;
     payload.hit.distance = range;
-    traceRayEXT(kTLAS[frame.tlas], LVK_RAY_FLAG_NONE, 0xffu, 0, 0, 0, origin, 0.0, direction, range, 0);
+    traceRayEXT(kTLAS[frame.tlas], nearestFlags(seed), 0xffu, 0, 0, 0, origin, 0.0, direction, range, 0);
     return payload.hit;
 }
 

@@ -10,9 +10,9 @@ void main() {
     uvec2 pixel = uvec2(gl_FragCoord.xy);
     Instance instance = frame.instances.at[inTriangle.x];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + argument];
-    if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend)) != 0u) {
+    if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend | kSingleSided)) != 0u) {
         Payload payload;
-        payload.seed = hashWords(randomOf(pixel, 0u).seed, frame.sampleNumber) & 0x7fffffffu;
+        payload.seed = nearestSeed(hashWords(randomOf(pixel, 0u).seed, frame.sampleNumber), true);
         Hit hit = Hit(inTriangle.x, argument, inTriangle.y, inBarycentrics, 0.0);
         if (passesThrough(hit, cameraDirection(frame.camera, pixel), payload)) {
             discard;

@@ -23,5 +23,6 @@ mod reference;
 mod reference_tracer;
 mod sample_models;
 mod scenes;
+mod single_sided;
 mod still_life;
 mod texture_budget;

@@ -13,6 +13,7 @@ use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
 use super::emitters::{EmissiveMeshes, emission_color, emission_weight};
 use super::instances::MeshKey;
 use super::layout::{GpuAttributes, GpuGeometry, QUANTISED};
+use super::materials::is_single_sided;
 use super::vertices::{PackedPositions, attributes};
 use crate::model::{moved, movers};
 
@@ -42,6 +43,8 @@ pub(crate) struct GpuMesh {
     pub(crate) geometry_count: u32,
     /// The box around it; `None` if its vertices move.
     pub(crate) bounds: Option<Bounds>,
+    /// The eye sees the back of none of its surfaces.
+    pub(crate) is_single_sided: bool,
     pub(crate) blas: Holder<AccelStructHandle>,
 }
 
@@ -67,6 +70,7 @@ struct Part {
     triangle_count: u32,
     material: u32,
     is_opaque: bool,
+    is_single_sided: bool,
     /// Luminance of its light, if shadow rays look for it.
     emission_weight: f32,
 }
@@ -84,15 +88,20 @@ impl Arena {
                 key.deformed_by.is_none() && PackedPositions::is_quantised(&primitive.positions);
             let is_still = key.deformed_by.is_none();
             let emission_weight = if is_still { emission_weight(material, model) } else { 0.0 };
-            self.add(primitive, (number as u32, is_opaque(material)), is_quantised, emission_weight);
+            self.add(primitive, (number as u32, material), is_quantised, emission_weight);
         }
-        self.parts.len() - before
+        let own = &mut self.parts[before..];
+        // Rays leave out all backs of an instance or none. Where only some are seen, the others have to be looked at one by one.
+        if own.iter().any(|part| !part.is_single_sided) {
+            own.iter_mut().for_each(|part| part.is_opaque &= !part.is_single_sided);
+        }
+        own.len()
     }
 
     fn add(
         &mut self,
         primitive: &Primitive,
-        (material, is_opaque): (u32, bool),
+        (number, material): (u32, &Material),
         is_quantised: bool,
         emission_weight: f32,
     ) {
@@ -107,8 +116,9 @@ impl Arena {
             first_index: self.index_count,
             vertex_count: vertex_count as u32,
             triangle_count: primitive.triangle_count() as u32,
-            material,
-            is_opaque,
+            material: number,
+            is_opaque: is_opaque(material),
+            is_single_sided: is_single_sided(material),
         });
         *position_count += vertex_count;
         self.vertex_count += vertex_count;
@@ -375,7 +385,9 @@ fn build(
         .map(|(((key, count), bounds), blas)| {
             let (first_geometry, geometry_count) = (next, *count as u32);
             next += geometry_count;
-            (*key, GpuMesh { first_geometry, geometry_count, bounds: *bounds, blas })
+            let own = &parts[first_geometry as usize..next as usize];
+            let is_single_sided = own.iter().all(|part| part.is_single_sided);
+            (*key, GpuMesh { first_geometry, geometry_count, bounds: *bounds, is_single_sided, blas })
         })
         .collect())
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use glam::{Mat3, Mat4, Vec3};
-use lvk::{TlasInstance, rows_from_columns};
+use lvk::{InstanceFlags, TlasInstance, rows_from_columns};
 use lvk_gltf::{Model, Placement};
 
 use super::geometry::{GpuMesh, GpuMeshes};
@@ -65,7 +65,9 @@ impl SceneInstances {
             shown.order.extend(same);
             let instances = first..shown.order.len() as u32;
             for custom_index in instances.clone() {
-                shown.structures.push(TlasInstance { custom_index, ..TlasInstance::new(*mesh.blas) });
+                let flags =
+                    if mesh.is_single_sided { InstanceFlags::empty() } else { InstanceFlags::NO_CULL };
+                shown.structures.push(TlasInstance { custom_index, flags, ..TlasInstance::new(*mesh.blas) });
                 shown.table.push(GpuInstance {
                     first_geometry: mesh.first_geometry,
                     ..bytemuck::Zeroable::zeroed()

@@ -17,6 +17,7 @@ pub(crate) const QUANTISED: u32 = 1;
 pub(crate) mod material_flag {
     pub(crate) const ALPHA_MASK: u32 = 1;
     pub(crate) const ALPHA_BLEND: u32 = 2;
+    pub(crate) const SINGLE_SIDED: u32 = 4;
     pub(crate) const UNLIT: u32 = 8;
     pub(crate) const THIN: u32 = 16;
     pub(crate) const TANGENTS: u32 = 32;

@@ -133,6 +133,11 @@ fn affine(transform: &TextureTransform) -> (Mat2, Vec2) {
     (Mat2::from_cols(at(1.0, 0.0) - offset, at(0.0, 1.0) - offset), offset)
 }
 
+/// True if the eye does not see the back of a surface. What bounds a volume is seen from within, as through its front.
+pub(super) fn is_single_sided(material: &Material) -> bool {
+    !material.double_sided && (is_thin(material) || transmission(material) == 0.0)
+}
+
 fn is_thin(material: &Material) -> bool {
     material.volume.as_ref().is_none_or(|volume| volume.thickness <= 0.0)
 }
@@ -161,6 +166,7 @@ fn flags(material: &Material) -> u32 {
     };
     let set = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     alpha
+        | set(is_single_sided(material), material_flag::SINGLE_SIDED)
         | set(material.unlit, material_flag::UNLIT)
         | set(is_thin(material), material_flag::THIN)
         | set(has_tangents(material), material_flag::TANGENTS)
@@ -196,6 +202,25 @@ mod tests {
             "{left:?}"
         );
         assert_eq!(extinction(&Material::default()), [0.0; 3]);
+    }
+
+    #[test]
+    fn backs_are_hidden_from_the_eye_but_of_double_sided_materials_and_of_volumes() {
+        let plain = Material::default();
+        assert!(is_single_sided(&plain));
+        assert!(!is_single_sided(&Material { double_sided: true, ..plain.clone() }));
+        let transmission = Some(lvk_gltf::Transmission { factor: 1.0, texture: None });
+        let pane = Material { transmission, ..plain.clone() };
+        assert!(is_single_sided(&pane));
+        let volume = lvk_gltf::Volume {
+            thickness: 1.0,
+            thickness_texture: None,
+            attenuation_distance: f32::INFINITY,
+            attenuation_color: [1.0; 3],
+        };
+        let opaque = Material { volume: Some(volume), ..plain };
+        assert!(is_single_sided(&opaque));
+        assert!(!is_single_sided(&Material { volume: Some(volume), ..pane }));
     }
 
     #[test]
