@@ -14,7 +14,7 @@ use super::effort::Effort;
 use super::group::{Group, GroupKey};
 use super::terrain::terrain;
 use crate::error::BenchError;
-use crate::measure::elapsed_ms;
+use crate::measure::{elapsed_ms, median_of};
 use crate::mesh::{Mesh, MeshBuffers};
 use crate::tracer::{RayKind, TracedImage};
 
@@ -55,6 +55,7 @@ fn curves(backend: &str) -> Vec<Curve> {
         curve("all moved, rebuilt", built),
         curve("of it the CPU", Expected::Grows("all are encoded")),
         curve("the same rays traced", traced),
+        curve("the same rays, GPU time", traced),
     ]
 }
 
@@ -65,7 +66,7 @@ fn costs(
     count: u64,
     image: [u32; 2],
     effort: Effort,
-) -> Result<[f64; 5], BenchError> {
+) -> Result<[f64; 6], BenchError> {
     let ctx = &backend.ctx;
     let mut instances: Vec<_> = (0..count).map(|number| instance(blas, number, count, 0.0)).collect();
     let built = effort.median(|| {
@@ -78,8 +79,11 @@ fn costs(
     })?;
     let tlas = create(ctx, &instances)?;
     let traced = TracedImage::new(ctx, mesh, image, tlas.index())?;
+    let mut gpu_times = Vec::new();
     let trace = effort.median(|| {
-        Ok(backend.stopwatch.time(|cmd| backend.tracer.record(cmd, &traced, RayKind::Primary))?.total)
+        let times = backend.stopwatch.time(|cmd| backend.tracer.record(cmd, &traced, RayKind::Primary))?;
+        gpu_times.push(times.gpu);
+        Ok(times.total)
     })?;
     let mut turn = 0.0;
     let mut moved = |which: std::ops::Range<u64>, mode, until: Until| {
@@ -99,7 +103,7 @@ fn costs(
     let one = moved(middle..middle + 1, BuildMode::Refit, Until::Done)?;
     let all = moved(0..count, BuildMode::Rebuild, Until::Done)?;
     let cpu = moved(0..count, BuildMode::Rebuild, Until::Submitted)?;
-    Ok([built, one, all, cpu, trace])
+    Ok([built, one, all, cpu, trace, median_of(&gpu_times, |ms| *ms)])
 }
 
 /// The end of a measured time.

@@ -12,7 +12,7 @@ use super::effort::Effort;
 use super::group::{Group, GroupKey};
 use super::terrain::terrain;
 use crate::error::BenchError;
-use crate::measure::{elapsed_ms, median_of};
+use crate::measure::{SubmissionTimes, elapsed_ms, median_of};
 use crate::mesh::{Mesh, MeshBuffers};
 use crate::tracer::{RayKind, TracedImage};
 
@@ -75,10 +75,9 @@ impl<'a> WarmUp<'a> {
     }
 }
 
-/// Returns the milliseconds of a trace.
-fn trace(backend: &Backend, traced: &TracedImage) -> Result<f64, BenchError> {
+fn trace(backend: &Backend, traced: &TracedImage) -> Result<SubmissionTimes, BenchError> {
     let trace = |cmd: &mut CommandBuffer| backend.tracer.record(cmd, traced, RayKind::Primary);
-    Ok(backend.stopwatch.time(trace)?.total)
+    backend.stopwatch.time(trace)
 }
 
 fn curves(backend: &str) -> Vec<Curve> {
@@ -87,12 +86,13 @@ fn curves(backend: &str) -> Vec<Curve> {
         curve("BLAS created and built", Unit::Milliseconds, Expected::Grows("all are sorted and built")),
         curve("first trace", Unit::Milliseconds, Expected::Grows("depth of the tree, and caches")),
         curve("traced again", Unit::Milliseconds, Expected::Grows("depth of the tree, and caches")),
+        curve("traced again, GPU time", Unit::Milliseconds, Expected::Grows("depth of the tree, and caches")),
         curve("memory of the BLAS", Unit::BytesPerTriangle, Expected::Constant),
     ]
 }
 
 /// Returns the cost of each curve.
-fn costs(warm_up: &WarmUp<'_>, mesh: &Mesh, image: [u32; 2], effort: Effort) -> Result<[f64; 4], BenchError> {
+fn costs(warm_up: &WarmUp<'_>, mesh: &Mesh, image: [u32; 2], effort: Effort) -> Result<[f64; 5], BenchError> {
     let backend = warm_up.backend;
     let ctx = &backend.ctx;
     let buffers = MeshBuffers::new(ctx, mesh)?;
@@ -109,7 +109,7 @@ fn costs(warm_up: &WarmUp<'_>, mesh: &Mesh, image: [u32; 2], effort: Effort) -> 
         let tlas = tlas(ctx, *blas, info.parts)?;
         let traced = TracedImage::new(ctx, mesh, image, tlas.index())?;
         warm_up.run(built)?;
-        first_traces.push(trace(backend, &traced)?);
+        first_traces.push(trace(backend, &traced)?.total);
         for _ in 0..LATER_TRACES {
             later_traces.push(trace(backend, &traced)?);
         }
@@ -117,8 +117,10 @@ fn costs(warm_up: &WarmUp<'_>, mesh: &Mesh, image: [u32; 2], effort: Effort) -> 
         ctx.wait_idle()?;
         Ok(built)
     })?;
-    let [first, later] = [&first_traces, &later_traces].map(|traces| median_of(traces, |ms| *ms));
-    Ok([built, first, later, bytes])
+    let first = median_of(&first_traces, |ms| *ms);
+    let again = median_of(&later_traces, |times| times.total);
+    let gpu = median_of(&later_traces, |times| times.gpu);
+    Ok([built, first, again, gpu, bytes])
 }
 
 fn tlas(ctx: &Context, blas: AccelStructHandle, parts: u32) -> lvk::Result<Holder<AccelStructHandle>> {
