@@ -1,6 +1,10 @@
 // A step of an edge-avoiding a-trous filter, guided by the variance of light over time (Schied et al., 2017). Light that no longer
-// varies is not blurred. `argument`: number of the step; its taps are 2^argument pixels apart.
+// varies is not blurred. The taps of step n are 2^n pixels apart, 3 x 3 of them: with 5 x 5 a step takes twice as long, and pictures are no
+// nearer to the reference. The last step makes the picture of the frame: filtered light with the colours of its surfaces. `argument`: number
+// of the step (8 bits); whether it is the last one (1 bit).
 #include "viewer/plane.glsl"
+
+const uint kLastStep = 256u;
 
 const float kBrightnessScale = 3.0; // in standard deviations
 const float kSharpRoughness = 0.06; // mirrors below it are not blurred
@@ -46,10 +50,19 @@ vec4 blurred(Blur blur) {
     return vec4(blur.sum.rgb / blur.total, blur.sum.a / (blur.total * blur.total));
 }
 
+// The picture of a frame.
+void composePixel(uint place, vec3 matte, vec3 mirrored) {
+    vec3 base = frame.planes.at[planePlace(kPlaneBase, place)].rgb;
+    vec3 color = base + matte * frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb +
+                 mirrored * frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
+    frame.planes.at[planePlace(kPlaneFrame, place)] = vec4(color, 1.0);
+}
+
 void filterPixel(uvec2 at) {
     ivec2 pixel = ivec2(at);
     uint place = pixelPlace(pixel);
-    uint to = argument & 1u;
+    uint step = argument & 0xffu;
+    uint to = step & 1u;
     uint from = 1u - to;
     Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, place)]);
     vec4 ownMatte = frame.planes.at[planePlace(kPlaneMatte + from, place)];
@@ -58,12 +71,12 @@ void filterPixel(uvec2 at) {
     Blur mirrored = startBlur(kPlaneMirrored + from, pixel, ownMirrored);
     vec3 point = seenPoint(frame.camera, pixel, seen.distance);
     float otherTolerance = max(2.0 * frame.camera.pixelSpread * seen.distance, 1e-6);
-    float ownTolerance = otherTolerance * float(1u << argument);
+    float ownTolerance = otherTolerance * float(1u << step);
     float sharpness = 1.0 / max(seen.roughness * seen.roughness, 1e-3);
-    const float kernel[3] = float[](1.0, 2.0 / 3.0, 1.0 / 6.0);
-    for (int y = -2; y <= 2 && !isSky(seen); ++y) {
-        for (int x = -2; x <= 2; ++x) {
-            ivec2 tap = pixel + ivec2(x, y) * int(1u << argument);
+    const float kernel[2] = float[](1.0, 0.5);
+    for (int y = -1; y <= 1 && !isSky(seen); ++y) {
+        for (int x = -1; x <= 1; ++x) {
+            ivec2 tap = pixel + ivec2(x, y) * int(1u << step);
             bool isInside = all(greaterThanEqual(tap, ivec2(0))) && all(lessThan(tap, ivec2(frame.camera.width, frame.camera.height)));
             if ((x == 0 && y == 0) || !isInside) {
                 continue;
@@ -86,8 +99,17 @@ void filterPixel(uvec2 at) {
             }
         }
     }
-    frame.planes.at[planePlace(kPlaneMatte + to, place)] = blurred(matte);
-    frame.planes.at[planePlace(kPlaneMirrored + to, place)] = blurred(mirrored);
+    vec4 blurredMatte = blurred(matte);
+    vec4 blurredMirrored = blurred(mirrored);
+    bool isLast = (argument & kLastStep) != 0u;
+    if (isLast) {
+        composePixel(place, blurredMatte.rgb, blurredMirrored.rgb);
+    }
+    // After the last step only views of the light read them.
+    if (!isLast || frame.view != kViewLight) {
+        frame.planes.at[planePlace(kPlaneMatte + to, place)] = blurredMatte;
+        frame.planes.at[planePlace(kPlaneMirrored + to, place)] = blurredMirrored;
+    }
 }
 
 #define PIXEL_FUNCTION filterPixel

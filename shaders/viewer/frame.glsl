@@ -269,7 +269,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     vec3 boxMin; // around the scene
     vec3 boxMax;
     float occlusionDistance; // of surfaces that take no ambient light from each other
-    uint padding;
+    uint lightRate; // pixels for each that finds light in a frame: 1 or 4 of light_turn.glsl
 };
 
 layout(push_constant, scalar) uniform PushConstants {
@@ -277,5 +277,10 @@ layout(push_constant, scalar) uniform PushConstants {
     uint argument; // of the pass
     uint firstVisible; // of a draw: where its instances begin among those that culling leaves; kAllInstances without culling
 };
+
+// The pixel whose number is `place`, in rows from the top.
+uvec2 pixelOf(uint place) {
+    return uvec2(place % frame.camera.width, place / frame.camera.width);
+}
 
 #endif

@@ -30,10 +30,6 @@ uint nearestSeed(uint random, bool isFromEye) {
     return random >> 2 | (isFromEye ? kFromEye : 0u);
 }
 
-uint nearestFlags(uint seed) {
-    return (seed & kFromEye) != 0u ? LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES : LVK_RAY_FLAG_NONE;
-}
-
 struct Triangle {
     uvec3 corners;
     uint geometry; // in the list of all

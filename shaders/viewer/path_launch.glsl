@@ -8,6 +8,7 @@
 #ifndef VIEWER_PATH_LAUNCH
 #define VIEWER_PATH_LAUNCH
 
+#include "viewer/light_turn.glsl"
 #include "viewer/path.glsl"
 
 const uint kBeginsPaths = 8u;
@@ -30,9 +31,9 @@ void pathLaunch(uvec2 at) {
     if (!begins && index >= lists.at[turn % 3u]) {
         return;
     }
-    uint place = begins ? index : lists.at[listPlace(turn, index)];
-    uvec2 pixel = uvec2(place % frame.camera.width, place / frame.camera.width);
-    Random random = randomOf(pixel, frame.sampleNumber + (argument >> 16));
+    uvec2 pixel = begins ? pixelOfInvocation(at) : pixelOf(lists.at[listPlace(turn, index)]);
+    uint place = pixel.y * frame.camera.width + pixel.x;
+    Random random = randomOf(pixel, firstSample(pixel) + (argument >> 16));
     Path path;
     if (begins) {
         path = beginPath(pixel, random);

@@ -29,6 +29,13 @@ const uint kPlaneFrame = 17u; // the picture of this frame
 const uint kPlaneBefore = 18u; // where the point that the pixel shows was in the frame before, and how far its surface has turned since
 const uint kPlaneShown = 19u;
 
+// In the last component of kPlaneMatte: the pixel has found no light in this frame.
+const float kNoSample = -1.0;
+
+bool isSample(vec4 matte) {
+    return matte.a != kNoSample;
+}
+
 uint pixelPlace(ivec2 pixel) {
     return uint(pixel.y) * frame.camera.width + uint(pixel.x);
 }

@@ -29,7 +29,7 @@ bool usesCache() {
 
 // True if the path of a pixel is whole and updates the cache in this frame.
 bool isUpdating(uint place) {
-    uvec2 pixel = uvec2(place % frame.camera.width, place / frame.camera.width);
+    uvec2 pixel = pixelOf(place);
     uvec2 block = pixel / kBlock;
     uint turn = frame.frameNumber * 7u + hashWords(block.x, block.y);
     return (pixel.y % kBlock) * kBlock + pixel.x % kBlock == turn % (kBlock * kBlock);
@@ -37,7 +37,7 @@ bool isUpdating(uint place) {
 
 // The number of the block of a pixel, whose path that updates has a place in the list.
 uint blockOf(uint place) {
-    uvec2 block = uvec2(place % frame.camera.width, place / frame.camera.width) / kBlock;
+    uvec2 block = pixelOf(place) / kBlock;
     return block.y * ((frame.camera.width + kBlock - 1u) / kBlock) + block.x;
 }
 

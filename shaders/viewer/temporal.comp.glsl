@@ -1,6 +1,6 @@
 // Adds the light of a frame to that of the frames before, where they saw the same surface (Schied et al., "Spatiotemporal
 // Variance-Guided Filtering", 2017).
-#include "viewer/plane.glsl"
+#include "viewer/history.glsl"
 
 // Frames in the mean of matte layers while the camera moves.
 const float kMostFrames = 48.0;
@@ -21,24 +21,16 @@ const int kNearbyPixels = 2;
 const float kMostStillFrames = 65536.0;
 // Frames before the variance over time says enough.
 const float kFirstFrames = 4.0;
-// Of the weight of the nearest four pixels.
-const float kLeastShare = 0.05;
-// Of the angle between normals of one surface.
-const float kLeastCosine = 0.8;
+// Frames of which a mean holds samples, as a number of samples: a pixel has one in each frame, or in some.
+float samplesIn(float frames) {
+    return max(frames / float(frame.lightRate), 1.0);
+}
 
 struct History {
     vec4 matte;
     vec4 mirrored;
     vec4 moments;
 };
-
-bool isSameSurface(Seen seen, vec3 point, Seen before, ivec2 pixel) {
-    if (isSky(before) || before.instance != seen.instance || dot(before.normal, seen.normal) < kLeastCosine) {
-        return false;
-    }
-    vec3 way = seenPoint(frame.seenBefore, pixel, before.distance) - point;
-    return abs(dot(way, seen.normal)) < 0.01 * seen.distance;
-}
 
 // Brightnesses around a pixel: sums of this frame's, of their squares, and of the means of the frames before.
 struct Nearby {
@@ -64,8 +56,11 @@ Nearby nearbyLight(ivec2 pixel, ivec2 before, Seen seen) {
             if (isSky(other) || isSky(old) || other.instance != seen.instance || old.instance != seen.instance) {
                 continue;
             }
-            vec2 light = vec2(brightness(frame.planes.at[planePlace(kPlaneMatte, pixelPlace(now))].rgb),
-                              brightness(frame.planes.at[planePlace(kPlaneMirrored, pixelPlace(now))].rgb));
+            vec4 matte = frame.planes.at[planePlace(kPlaneMatte, pixelPlace(now))];
+            if (!isSample(matte)) {
+                continue;
+            }
+            vec2 light = vec2(brightness(matte.rgb), brightness(frame.planes.at[planePlace(kPlaneMirrored, pixelPlace(now))].rgb));
             nearby.sum += light;
             nearby.squares += light * light;
             nearby.before += frame.planes.at[previousPlane(kPlaneMoments, pixelPlace(then))].xy;
@@ -88,14 +83,10 @@ const History kNoHistory = History(vec4(0.0), vec4(0.0), vec4(0.0));
 
 // Adds the history of a pixel that saw the same surface, which was at `point`. Returns its weight, or 0.
 float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 point) {
-    bool isInside = all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, ivec2(frame.camera.width, frame.camera.height)));
-    if (weight <= 0.0 || !isInside) {
+    if (weight <= 0.0 || !sawSame(pixel, seen, point)) {
         return 0.0;
     }
     uint from = pixelPlace(pixel);
-    if (!isSameSurface(seen, point, unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]), pixel)) {
-        return 0.0;
-    }
     sum.matte += weight * frame.planes.at[previousPlane(kPlaneMatteHistory, from)];
     sum.mirrored += weight * frame.planes.at[previousPlane(kPlaneMirroredHistory, from)];
     sum.moments += weight * frame.planes.at[previousPlane(kPlaneMoments, from)];
@@ -106,14 +97,10 @@ float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 p
 // hardly any of the nearest four did, of the nearest nine: what is covered by chance shows a pixel one surface now and another one then.
 History historyAt(vec2 place, Seen seen, vec3 point) {
     History sum = kNoHistory;
-    vec2 low = floor(place - 0.5);
-    vec2 part = place - 0.5 - low;
-    part = mix(part, round(part), lessThan(abs(part - round(part)), vec2(0.01)));
+    Corners corners = cornersAt(place);
     float total = 0.0;
-    for (int corner = 0; corner < 4; ++corner) {
-        ivec2 offset = ivec2(corner & 1, corner >> 1);
-        vec2 share = mix(1.0 - part, part, vec2(offset));
-        total += addHistory(sum, ivec2(low) + offset, share.x * share.y, seen, point);
+    for (int number = 0; number < 4; ++number) {
+        total += addHistory(sum, cornerPixel(corners, number), cornerWeight(corners, number), seen, point);
     }
     if (total <= kLeastShare) {
         sum = kNoHistory;
@@ -142,34 +129,37 @@ void temporalPixel(uvec2 at) {
     ivec2 pixel = ivec2(at);
     uint place = pixelPlace(pixel);
     Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, place)]);
-    vec3 matte = frame.planes.at[planePlace(kPlaneMatte, place)].rgb;
+    vec4 matte = frame.planes.at[planePlace(kPlaneMatte, place)];
     vec3 mirrored = frame.planes.at[planePlace(kPlaneMirrored, place)].rgb;
     History history = kNoHistory;
     vec3 point = seenPoint(frame.camera, pixel, seen.distance);
     vec4 beforeAndTurn = frame.planes.at[planePlace(kPlaneBefore, place)];
     vec3 before = beforeAndTurn.xyz;
-    float matteFrames = frame.sceneMoves != 0u ? kMostMovingFrames : kMostFrames;
-    float mirrorFrames = clamp(framesOfHighlight(seen, point, before), kLeastMirrorFrames, matteFrames);
+    float matteFrames = frame.sceneMoves != 0u ? samplesIn(kMostMovingFrames) : kMostFrames;
+    float mirrorFrames = clamp(samplesIn(framesOfHighlight(seen, point, before)), kLeastMirrorFrames, matteFrames);
     if (frame.frameNumber > 0u && !isSky(seen)) {
         vec2 from = vec2(pixel) + 0.5 - motionOf(point, before);
         history = historyAt(from, seen, before);
         if (frame.sceneMoves != 0u && history.matte.a > 0.0) {
-            float turnFrames = max(kMostTurn / max(beforeAndTurn.w, 1e-6), kLeastTurnFrames);
+            float turnFrames = samplesIn(max(kMostTurn / max(beforeAndTurn.w, 1e-6), kLeastTurnFrames));
+            float changedFrames = min(turnFrames, samplesIn(kMostChangedFrames));
             bvec2 changed = hasChanged(nearbyLight(pixel, ivec2(floor(from)), seen));
-            matteFrames = min(matteFrames, changed.x ? min(turnFrames, kMostChangedFrames) : turnFrames);
-            mirrorFrames = min(mirrorFrames, changed.y ? min(turnFrames, kMostChangedFrames) : turnFrames);
+            matteFrames = min(matteFrames, changed.x ? changedFrames : turnFrames);
+            mirrorFrames = min(mirrorFrames, changed.y ? changedFrames : turnFrames);
         }
     }
     bool isStill = frame.stillCount > 0u;
-    history.matte = extended(history.matte, matte, isStill ? kMostStillFrames : matteFrames);
-    history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillFrames : mirrorFrames);
-    vec2 bright = vec2(brightness(matte), brightness(mirrored));
-    vec4 counts = vec2(history.matte.a, history.mirrored.a).xyxy;
-    history.moments = mix(history.moments, vec4(bright, bright * bright), 1.0 / counts);
+    if (isSample(matte)) {
+        history.matte = extended(history.matte, matte.rgb, isStill ? kMostStillFrames : matteFrames);
+        history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillFrames : mirrorFrames);
+        vec2 bright = vec2(brightness(matte.rgb), brightness(mirrored));
+        history.moments = mix(history.moments, vec4(bright, bright * bright), 1.0 / vec2(history.matte.a, history.mirrored.a).xyxy);
+    }
+    vec2 counts = max(vec2(history.matte.a, history.mirrored.a), 1.0);
     // Of the mean. A few frames say little about how much their light varies.
     vec2 variance = max(history.moments.zw - history.moments.xy * history.moments.xy, 0.0);
-    vec2 few = max(kFirstFrames / counts.xy - 1.0, 0.0) * history.moments.xy * history.moments.xy;
-    variance = variance / counts.xy + few;
+    vec2 few = max(kFirstFrames / counts - 1.0, 0.0) * history.moments.xy * history.moments.xy;
+    variance = variance / counts + few;
     frame.planes.at[currentPlane(kPlaneMatteHistory, place)] = history.matte;
     frame.planes.at[currentPlane(kPlaneMirroredHistory, place)] = history.mirrored;
     frame.planes.at[currentPlane(kPlaneMoments, place)] = history.moments;

@@ -3,6 +3,7 @@
 #define VIEWER_TRACE_PIPELINE
 
 #include "viewer/hit.glsl"
+#include "viewer/nearest_flags.glsl"
 
 layout(location = 0) rayPayloadEXT Payload payload;
 

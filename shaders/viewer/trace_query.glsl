@@ -7,6 +7,7 @@
 #include <lvk/ray_query.glsl>
 
 #include "viewer/candidate.glsl"
+#include "viewer/nearest_flags.glsl"
 
 // Of the ray under way.
 Payload payload;

@@ -1,6 +1,7 @@
 // The triangle that a pixel shows.
 #define VIEWER_RASTERISES
 #include "viewer/candidate.glsl"
+#include "viewer/light_turn.glsl"
 
 layout(location = 0) flat in uvec2 inTriangle;
 layout(location = 1) in vec2 inBarycentrics;
@@ -12,7 +13,7 @@ void main() {
     Geometry geometry = frame.geometries.at[instance.firstGeometry + argument];
     if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend | kSingleSided)) != 0u) {
         Payload payload;
-        payload.seed = nearestSeed(hashWords(randomOf(pixel, 0u).seed, frame.sampleNumber), true);
+        payload.seed = nearestSeed(hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)), true);
         Hit hit = Hit(inTriangle.x, argument, inTriangle.y, inBarycentrics, 0.0);
         if (passesThrough(hit, cameraDirection(frame.camera, pixel), payload)) {
             discard;

@@ -3,16 +3,18 @@
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 
+#include "viewer/history.glsl"
+#include "viewer/light_turn.glsl"
 #include "viewer/radiance_cache.glsl"
 #include "viewer/visible_surface.glsl"
 
 // Exposed light that a path brings in the first frame of a still at most. A brighter path would leave a bright spot for many frames.
 const float kBrightestPath = 12.0;
 
-// Light that a path brings to the eye. The bound grows with the frames of a still, by the fourth root of their number: a spot fades
+// Light that a path brings to the eye. The bound grows with the samples of a still, by the fourth root of their number: a spot fades
 // before it is seen, and the mean still comes to that of all paths.
 vec3 boundedLight(vec3 light) {
-    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount)));
+    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount / frame.lightRate)));
     float most = largest(light) * frame.exposure;
     return most > bound ? light * (bound / most) : light;
 }
@@ -66,6 +68,22 @@ void endInSky(uint place, vec3 direction) {
 void endUnlit(uint place, Seen seen, vec3 color) {
     storeSurface(place, seen, color, vec3(0.0), vec3(0.0));
     storeFirst(place, kNoLight);
+}
+
+// True if a pixel finds light in this frame: if it is its turn, if nothing is known of its surface, or if its path updates the cache.
+bool findsLight(uint place, Seen seen, vec3 pointBefore) {
+    uvec2 pixel = pixelOf(place);
+    if (isTurn(pixel) || frame.frameNumber == 0u || (usesCache() && isUpdating(place))) {
+        return true;
+    }
+    vec3 point = seenPoint(frame.camera, ivec2(pixel), seen.distance);
+    return !hasHistory(vec2(pixel) + 0.5 - motionOf(point, pointBefore), seen, pointBefore);
+}
+
+// A pixel that finds no light in this frame.
+void endWithoutLight(uint place, Seen seen, Surface surface, Bsdf bsdf) {
+    storeLayers(place, seen, surface, bsdf);
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(0.0, 0.0, 0.0, kNoSample);
 }
 
 FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen, uint place) {
@@ -177,9 +195,12 @@ bool advance(inout Path path, uint place, inout Random random) {
     }
     Surface surface = reach(path, hit);
     bool isUnlit = (surface.flags & kUnlit) != 0u;
+    bool isWithoutLight = false;
     Seen seen = Seen(surface.normal, hit.distance, hit.instance, surface.roughness);
     if (isFirst) {
-        storePoint(place, pointBefore(hit, frame.camera.eye + hit.distance * path.direction));
+        vec4 before = pointBefore(hit, frame.camera.eye + hit.distance * path.direction);
+        storePoint(place, before);
+        isWithoutLight = !findsLight(place, seen, before.xyz);
         if (isUnlit) {
             endUnlit(place, seen, surface.baseColor);
             return false;
@@ -192,6 +213,10 @@ bool advance(inout Path path, uint place, inout Random random) {
         }
     }
     Bsdf bsdf = bsdfOf(surface, -path.direction);
+    if (isWithoutLight) {
+        endWithoutLight(place, seen, surface, bsdf);
+        return false;
+    }
     if (!isFirst && usesCache() && isCached(path, surface, bsdf) && endsInCache(path, surface, bsdf, place, random)) {
         return false;
     }
@@ -217,6 +242,9 @@ bool advance(inout Path path, uint place, inout Random random) {
 void endPath(Path path, uint place) {
     if (usesCache() && isUpdating(place)) {
         addUpdates(place, path);
+    }
+    if (!isSample(frame.planes.at[planePlace(kPlaneMatte, place)])) {
+        return;
     }
     FirstLight first = storedFirst(place);
     vec3 beyond = radianceOf(path);

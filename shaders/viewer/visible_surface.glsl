@@ -8,7 +8,7 @@
 
 // Where the ray of a pixel meets the plane of the triangle that the pixel shows.
 Hit visibleHit(uint place, vec3 direction) {
-    uvec4 visible = visibleTriangle(ivec2(place % frame.camera.width, place / frame.camera.width));
+    uvec4 visible = visibleTriangle(ivec2(pixelOf(place)));
     if (visible.x == kNothing) {
         return Hit(kNothing, 0u, 0u, vec2(0.0), 0.0);
     }

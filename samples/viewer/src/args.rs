@@ -7,7 +7,7 @@ use lvk_samples::app::ray_args::RayArgs;
 use lvk_samples::app::value_parsers::{positive, whole};
 
 use crate::config::{
-    Content, CullingMode, IndirectLight, Method, PrimaryVisibility, ToneMapping, ViewerConfig,
+    Content, CullingMode, IndirectLight, LightRate, Method, PrimaryVisibility, ToneMapping, ViewerConfig,
 };
 
 /// Arguments of the sample.
@@ -77,6 +77,11 @@ pub struct ViewerArgs {
     /// Where the hybrid method takes the light from that surfaces beyond the visible ones scatter
     #[arg(long, value_enum, default_value_t = IndirectLight::default())]
     pub indirect: IndirectLight,
+
+    /// Pixels that find light in each frame of the hybrid method: all, or one of each 2 x 2 by turns, with a fourth of the rays. Each then
+    /// has a fourth of the samples
+    #[arg(long, value_enum, default_value_t = LightRate::default())]
+    pub light_rate: LightRate,
 
     /// Entries of the radiance cache of --indirect cache, 1 to 16777216, of 40 bytes each; where they do not suffice, more paths go on
     #[arg(long, value_name = "N", default_value_t = ViewerConfig::DEFAULT_CACHE_ENTRIES)]

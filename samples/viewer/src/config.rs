@@ -63,6 +63,17 @@ pub enum IndirectLight {
     AmbientOcclusion,
 }
 
+/// Pixels that find light in a frame of the hybrid method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum LightRate {
+    /// All.
+    #[default]
+    Full,
+    /// One of each 2 x 2 by turns, and those of which the frames before know nothing. All others have the mean of their samples in the
+    /// frames before.
+    Quarter,
+}
+
 /// How the hybrid method finds the surfaces that pixels show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum PrimaryVisibility {
@@ -118,6 +129,8 @@ pub struct ViewerConfig {
     pub primary: PrimaryVisibility,
     /// Where the hybrid method takes the light from that surfaces beyond the visible ones scatter.
     pub indirect: IndirectLight,
+    /// Pixels that find light in a frame of the hybrid method.
+    pub light_rate: LightRate,
     /// Entries of the radiance cache, 1 to [`ViewerConfig::MAX_CACHE_ENTRIES`]. Where they do not suffice, more paths go on.
     pub cache_entries: u32,
     /// Culling of instances that are rasterised.
@@ -154,6 +167,7 @@ impl ViewerConfig {
             texture_budget: None,
             primary: PrimaryVisibility::default(),
             indirect: IndirectLight::default(),
+            light_rate: LightRate::default(),
             cache_entries: Self::DEFAULT_CACHE_ENTRIES,
             culling: CullingMode::default(),
             is_progressive: false,
@@ -173,6 +187,14 @@ impl ViewerConfig {
     /// True if frames have ambient occlusion.
     pub(crate) fn occludes_ambient(&self) -> bool {
         self.method == Method::Hybrid && self.indirect == IndirectLight::AmbientOcclusion
+    }
+
+    /// Pixels for each that finds light in a frame.
+    pub(crate) fn pixels_for_each_with_light(&self) -> u32 {
+        match (self.method, self.light_rate) {
+            (Method::Hybrid, LightRate::Quarter) => 4,
+            (Method::PathTrace, _) | (_, LightRate::Full) => 1,
+        }
     }
 
     /// True if frames are rasterised.

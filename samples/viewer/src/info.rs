@@ -101,7 +101,7 @@ fn needs(args: &ViewerArgs, textures: u32) -> DeviceNeeds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{CullingMode, IndirectLight, PrimaryVisibility, ViewerConfig};
+    use crate::config::{CullingMode, IndirectLight, LightRate, PrimaryVisibility, ViewerConfig};
     use crate::light::SunSetting;
     use lvk_samples::app::cli::{command, parse};
 
@@ -129,6 +129,8 @@ mod tests {
         assert_eq!(args.cache_entries, ViewerConfig::DEFAULT_CACHE_ENTRIES);
         assert_eq!(parsed("--indirect cache").unwrap().indirect, IndirectLight::Cache);
         assert_eq!(parsed("--indirect ambient-occlusion").unwrap().indirect, IndirectLight::AmbientOcclusion);
+        assert_eq!(args.light_rate, LightRate::Full);
+        assert_eq!(parsed("--light-rate quarter").unwrap().light_rate, LightRate::Quarter);
         assert_eq!(parsed("--primary raster").unwrap().primary, PrimaryVisibility::Raster);
         assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
         assert!(!args.real_time && parsed("--real-time --frames 0..9").unwrap().real_time);
@@ -162,6 +164,7 @@ mod tests {
             "--culling everything",
             "--primary guess",
             "--indirect guess",
+            "--light-rate half",
             "--cache-entries 0",
             "--real-time --frames 0..9 --resume",
             "a.glb b.glb",

@@ -35,6 +35,8 @@ mod viewer;
 mod viewer_sample;
 
 pub use args::{LightArgs, SkyArg, ViewerArgs};
-pub use config::{Content, CullingMode, IndirectLight, Method, PrimaryVisibility, ToneMapping, ViewerConfig};
+pub use config::{
+    Content, CullingMode, IndirectLight, LightRate, Method, PrimaryVisibility, ToneMapping, ViewerConfig,
+};
 pub use gpu::{DrawnInstances, TextureMemory};
 pub use viewer::{PreparationTimes, Viewer, ViewerScene};

@@ -101,6 +101,7 @@ impl Request {
             texture_budget: args.texture_budget.map(|mib| u64::from(mib) << 20),
             primary: args.primary,
             indirect: args.indirect,
+            light_rate: args.light_rate,
             cache_entries: args.cache_entries,
             culling: args.culling,
             is_progressive: self.is_for_window || args.real_time,

@@ -4,7 +4,7 @@ use egui::{Color32, RichText};
 use lvk_gltf::Animation;
 
 use crate::config::{
-    Content, CullingMode, IndirectLight, Method, PrimaryVisibility, ToneMapping, ViewerConfig,
+    Content, CullingMode, IndirectLight, LightRate, Method, PrimaryVisibility, ToneMapping, ViewerConfig,
 };
 use crate::gpu::{DrawnInstances, TextureMemory};
 use crate::model::ModelCamera;
@@ -113,6 +113,11 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
             ui.selectable_value(&mut config.indirect, IndirectLight::Cache, "cache");
             ui.selectable_value(&mut config.indirect, IndirectLight::Paths, "paths");
             ui.selectable_value(&mut config.indirect, IndirectLight::AmbientOcclusion, "ambient occlusion");
+        });
+        ui.horizontal(|ui| {
+            ui.label("light rate");
+            ui.selectable_value(&mut config.light_rate, LightRate::Full, "full");
+            ui.selectable_value(&mut config.light_rate, LightRate::Quarter, "quarter");
         });
     }
     if config.rasterises() {

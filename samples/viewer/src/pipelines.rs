@@ -48,7 +48,6 @@ pub(crate) const VISIBILITY_VERTEX: SampleStage = stage!("visibility.vert");
 pub(crate) const VISIBILITY_FRAGMENT: SampleStage = stage!("visibility.frag");
 pub(crate) const TEMPORAL: SampleStage = stage!("temporal.comp");
 pub(crate) const FILTER: SampleStage = stage!("filter.comp");
-pub(crate) const COMPOSITE: SampleStage = stage!("composite.comp");
 pub(crate) const ANTIALIAS: SampleStage = stage!("antialias.comp");
 pub(crate) const RADIANCE_CACHE: SampleStage = stage!("radiance_cache.comp");
 pub(crate) const STEPS: SampleStage = stage!("steps.comp");
@@ -83,7 +82,6 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
         SamplePipeline::new("viewer: radiance cache", &[RADIANCE_CACHE]),
         SamplePipeline::new("viewer: means over time", &[TEMPORAL]),
         SamplePipeline::new("viewer: filter", &[FILTER]),
-        SamplePipeline::new("viewer: composite", &[COMPOSITE]),
         SamplePipeline::new("viewer: antialiasing", &[ANTIALIAS]),
         SamplePipeline::new("viewer: steps of rays", &[STEPS]),
         SamplePipeline::new("viewer: picture", &[PRESENT]),

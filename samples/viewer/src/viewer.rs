@@ -427,7 +427,7 @@ impl Viewer {
             ambient: self.shown.gpu.ambient(),
             occlusion_distance: OCCLUSION_SHARE
                 * self.shown.bounds.min.distance(self.shown.bounds.max).max(f32::MIN_POSITIVE),
-            _padding: 0,
+            light_rate: self.config.pixels_for_each_with_light(),
         })
     }
 

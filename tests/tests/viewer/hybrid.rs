@@ -18,7 +18,7 @@ use lvk_tests::device;
 use lvk_tests::image_comparison::{Tolerance, assert_similar};
 use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, SunSetting};
-use lvk_viewer::{Content, Method, PrimaryVisibility, ViewerConfig};
+use lvk_viewer::{Content, IndirectLight, LightRate, Method, PrimaryVisibility, ViewerConfig};
 
 use crate::scenes::{
     Builder, View, assert_close, config, configured_viewer, matte, mean, radiance_by, viewer,
@@ -51,6 +51,55 @@ fn a_still_comes_close_to_the_reference() {
     assert_similar("64 frames", &picture(&ctx, Method::Hybrid, &model, &view(64)), &reference, &many);
     let most = Tolerance { psnr: 31.0, ssim: 0.93, flip: 0.052, ..Tolerance::default() };
     assert_similar("400 frames", &picture(&ctx, Method::Hybrid, &model, &view(400)), &reference, &most);
+}
+
+/// Light of one pixel in four by turns: four times as many frames have as many samples.
+#[test]
+fn a_still_at_a_quarter_of_the_rate_has_the_light_of_the_reference() {
+    let Some(ctx) = software_device() else { return };
+    let model = still_life();
+    let reference = picture(&ctx, Method::PathTrace, &model, &view(1024));
+    let quarter = |samples, indirect| {
+        let usual = config((Method::Hybrid, RayPath::Query), &view(samples));
+        let config = ViewerConfig { light_rate: LightRate::Quarter, indirect, ..usual };
+        let mut viewer = configured_viewer(&ctx, &config, &model, &environment(), &view(samples));
+        let pixels = headless::picture(&mut viewer).unwrap();
+        (RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).unwrap(), mean(&viewer.radiance().unwrap()))
+    };
+    let few = Tolerance { psnr: 22.0, ssim: 0.75, flip: 0.15, ..Tolerance::default() };
+    assert_similar("16 frames", &quarter(16, IndirectLight::Paths).0, &reference, &few);
+    let many = Tolerance { psnr: 29.5, ssim: 0.91, flip: 0.065, ..Tolerance::default() };
+    assert_similar("256 frames", &quarter(256, IndirectLight::Paths).0, &reference, &many);
+    for indirect in [IndirectLight::Cache, IndirectLight::AmbientOcclusion] {
+        let usual = config((Method::Hybrid, RayPath::Query), &view(64));
+        let config = ViewerConfig { indirect, ..usual };
+        let mut viewer = configured_viewer(&ctx, &config, &model, &environment(), &view(64));
+        headless::picture(&mut viewer).unwrap();
+        let expected = mean(&viewer.radiance().unwrap());
+        assert_close(&format!("{indirect:?}"), quarter(256, indirect).1, expected, 0.02);
+    }
+}
+
+/// Invocations take pixels in another order where these take turns: each pixel has one, in pictures of odd sides too.
+#[test]
+fn every_pixel_shows_its_surface_at_any_rate() {
+    let Some(ctx) = software_device() else { return };
+    let model = still_life();
+    for size in [[95, 63], [96, 63], [95, 64], [1, 3], [3, 1]] {
+        for content in [Content::Normals, Content::Albedo] {
+            let [full, quarter] = [LightRate::Full, LightRate::Quarter].map(|light_rate| {
+                let view = View { size, ..view(1) };
+                let usual = config((Method::Hybrid, RayPath::Query), &view);
+                let config = ViewerConfig { light_rate, content, ..usual };
+                let mut viewer = configured_viewer(&ctx, &config, &model, &environment(), &view);
+                headless::picture(&mut viewer).unwrap();
+                viewer.radiance().unwrap()
+            });
+            // The number of a sample decides by chance what a veil shows.
+            let differing = full.iter().zip(&quarter).filter(|(full, quarter)| full != quarter).count();
+            assert!(20 * differing <= full.len(), "{content:?}, {size:?}: {differing} pixels differ");
+        }
+    }
 }
 
 /// A dark floor in bright exposure returns all of the light that the path tracer finds, though it is far from the first bound of a path.
@@ -146,18 +195,20 @@ fn a_moving_camera_leaves_no_trail() {
     let Some(ctx) = software_device() else { return };
     let model = still_life();
     let reference = picture(&ctx, Method::PathTrace, &model, &view(256));
-    let mut viewer = viewer(&ctx, (Method::Hybrid, RayPath::Query), &model, &environment(), &view(1));
-    viewer.configure(&ViewerConfig { is_progressive: true, ..*viewer.config() }).unwrap();
-    let end = view(1).camera;
-    let mut last = Vec::new();
-    for frame in (0..24_u8).rev() {
-        let [x, y, z] = end.eye;
-        viewer.set_view(&Camera { eye: [x - 0.04 * f32::from(frame), y, z], ..end });
-        last = headless::picture(&mut viewer).unwrap();
+    for light_rate in [LightRate::Full, LightRate::Quarter] {
+        let mut viewer = viewer(&ctx, (Method::Hybrid, RayPath::Query), &model, &environment(), &view(1));
+        viewer.configure(&ViewerConfig { is_progressive: true, light_rate, ..*viewer.config() }).unwrap();
+        let end = view(1).camera;
+        let mut last = Vec::new();
+        for frame in (0..24_u8).rev() {
+            let [x, y, z] = end.eye;
+            viewer.set_view(&Camera { eye: [x - 0.04 * f32::from(frame), y, z], ..end });
+            last = headless::picture(&mut viewer).unwrap();
+        }
+        let last = RgbaImage::from_raw(SIZE[0], SIZE[1], last).unwrap();
+        let moving = Tolerance { psnr: 22.0, ssim: 0.75, flip: 0.15, ..Tolerance::default() };
+        assert_similar(&format!("after 24 frames of motion, {light_rate:?}"), &last, &reference, &moving);
     }
-    let last = RgbaImage::from_raw(SIZE[0], SIZE[1], last).unwrap();
-    let moving = Tolerance { psnr: 22.0, ssim: 0.75, flip: 0.15, ..Tolerance::default() };
-    assert_similar("after 24 frames of motion", &last, &reference, &moving);
 }
 
 #[test]

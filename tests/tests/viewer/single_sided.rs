@@ -5,7 +5,6 @@ use glam::{Mat4, Vec3};
 use lvk::Context;
 use lvk_gltf::{AlphaMode, Material, Model, Transform};
 use lvk_samples::app::headless;
-use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::device;
 use lvk_tests::rtx_sample::{contexts_and_paths, software_device};

@@ -7,10 +7,12 @@ use crate::gpu::FrameScene;
 use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
 use crate::launch::{RayStages, compute, groups};
 use crate::path_pass::PathPass;
-use crate::pipelines::{AMBIENT_OCCLUSION, ANTIALIAS, COMPOSITE, FILTER, LIGHT, STEPS, TEMPORAL};
+use crate::pipelines::{AMBIENT_OCCLUSION, ANTIALIAS, FILTER, LIGHT, STEPS, TEMPORAL};
 
 /// Steps of the filter in space.
 const FILTER_STEPS: u32 = 4;
+/// Bit of the argument of the last step (`kLastStep` in `shaders/viewer/filter.comp.glsl`).
+const LAST_STEP: u32 = 256;
 
 /// The stages of the light of what pixels show.
 fn light_stages(config: &ViewerConfig) -> &'static RayStages {
@@ -22,7 +24,6 @@ pub(crate) struct Passes {
     light: PathPass,
     temporal: Holder<ComputePipelineHandle>,
     filter: Holder<ComputePipelineHandle>,
-    composite: Holder<ComputePipelineHandle>,
     antialias: Holder<ComputePipelineHandle>,
     /// Where the picture is of steps.
     steps: Option<Holder<ComputePipelineHandle>>,
@@ -36,7 +37,6 @@ impl Passes {
             light: PathPass::new(ctx, config, light_stages(config))?,
             temporal: filter(TEMPORAL)?,
             filter: filter(FILTER)?,
-            composite: filter(COMPOSITE)?,
             antialias: filter(ANTIALIAS)?,
             steps: is_of_steps.then(|| compute(ctx, STEPS, SCENE_LAYOUTS)).transpose()?,
         })
@@ -80,10 +80,10 @@ impl Passes {
         planes: BufferHandle,
         extent: [u32; 2],
     ) -> lvk::Result<()> {
-        let last = (FILTER_STEPS - 1) & 1;
-        let steps = (0..FILTER_STEPS).map(|step| (&self.filter, step));
+        let last = FILTER_STEPS - 1;
+        let steps = (0..last).chain([last | LAST_STEP]).map(|argument| (&self.filter, argument));
         let all = [(&self.temporal, 0)].into_iter().chain(steps);
-        for (pipeline, argument) in all.chain([(&self.composite, last), (&self.antialias, last)]) {
+        for (pipeline, argument) in all.chain([(&self.antialias, last & 1)]) {
             cmd.bind_compute_pipeline(**pipeline)?;
             cmd.push_constants(&push(argument))?;
             cmd.dispatch(groups(extent), &Dependencies { buffers: &[planes], ..Dependencies::default() })?;
