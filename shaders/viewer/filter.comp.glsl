@@ -9,9 +9,12 @@ const uint kLastStep = 256u;
 const float kBrightnessScale = 3.0; // in standard deviations
 const float kSharpRoughness = 0.06; // mirrors below it are not blurred
 
-// Light of a surface counts less, the more the normals differ.
-float normalWeight(vec3 a, vec3 b, float power) {
-    return pow(max(dot(a, b), 0.0), power);
+// The 64th power, by squares.
+float power64(float x) {
+    for (int i = 0; i < 6; ++i) {
+        x *= x;
+    }
+    return x;
 }
 
 float blurredVariance(uint plane, ivec2 pixel) {
@@ -90,12 +93,13 @@ void filterPixel(uvec2 at) {
             // What lies behind another instance has other light, as behind a veil.
             float tolerance = other.instance == seen.instance ? ownTolerance : otherTolerance;
             float weight = kernel[abs(x)] * kernel[abs(y)] * exp(-abs(dot(way, seen.normal)) / tolerance);
-            addTap(matte, frame.planes.at[planePlace(kPlaneMatte + from, tapPlace)], weight * normalWeight(seen.normal, other.normal, 64.0));
+            // Light of a surface counts less, the more the normals differ.
+            float cosine = max(dot(seen.normal, other.normal), 0.0);
+            addTap(matte, frame.planes.at[planePlace(kPlaneMatte + from, tapPlace)], weight * power64(cosine));
             bool isAlike = abs(other.roughness - seen.roughness) < 0.1 && seen.roughness > kSharpRoughness;
             if (isAlike) {
                 float power = clamp(16.0 * sharpness, 64.0, 4096.0);
-                addTap(mirrored, frame.planes.at[planePlace(kPlaneMirrored + from, tapPlace)],
-                       weight * normalWeight(seen.normal, other.normal, power));
+                addTap(mirrored, frame.planes.at[planePlace(kPlaneMirrored + from, tapPlace)], weight * pow(cosine, power));
             }
         }
     }

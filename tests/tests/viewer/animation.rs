@@ -12,7 +12,7 @@ use lvk_tests::device;
 use lvk_tests::rtx_sample::{contexts_and_paths, software_device};
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::model::posed;
-use lvk_viewer::{Content, Method, Viewer, ViewerConfig};
+use lvk_viewer::{Content, LightRate, Method, Viewer, ViewerConfig};
 
 use crate::moving_model::{DURATION, moving_model};
 use crate::paths::assert_alike;
@@ -121,32 +121,34 @@ fn moving_things_leave_no_trail_under_a_still_eye() {
         let still = posed(model.clone(), Some(0), time(frame).seconds() as f32);
         headless::picture(&mut shown(&still, 64)).unwrap()
     };
-    let mut played = shown(&model, 1);
-    played.configure(&ViewerConfig { is_progressive: true, ..*played.config() }).unwrap();
-    played.play(Some(0), 0.0);
-    let mut last = Vec::new();
-    for frame in 0..24 {
-        played.update(time(frame));
-        played.set_view(&view(1).camera);
-        last = headless::picture(&mut played).unwrap();
-    }
     let (now, before) = (still(23), still(17));
     let difference =
         |a: &[u8], b: &[u8]| a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum::<u32>();
-    let (mut change, mut trail) = (0, 0);
-    for ((last, now), before) in last.chunks(4).zip(now.chunks(4)).zip(before.chunks(4)) {
-        if difference(now, before) > 60 {
-            change += difference(now, before);
-            trail += difference(last, now);
+    for light_rate in [LightRate::Full, LightRate::Quarter] {
+        let mut played = shown(&model, 1);
+        played.configure(&ViewerConfig { is_progressive: true, light_rate, ..*played.config() }).unwrap();
+        played.play(Some(0), 0.0);
+        let mut last = Vec::new();
+        for frame in 0..24 {
+            played.update(time(frame));
+            played.set_view(&view(1).camera);
+            last = headless::picture(&mut played).unwrap();
         }
+        let (mut change, mut trail) = (0, 0);
+        for ((last, now), before) in last.chunks(4).zip(now.chunks(4)).zip(before.chunks(4)) {
+            if difference(now, before) > 60 {
+                change += difference(now, before);
+                trail += difference(last, now);
+            }
+        }
+        let share = f64::from(trail) / f64::from(change);
+        eprintln!(
+            "{light_rate:?}: {share:.3} of a change of {change}; whole picture {:.3}",
+            f64::from(difference(&last, &now)) / now.len() as f64
+        );
+        assert!(change > 20_000, "{change}");
+        assert!(share < 0.33, "{light_rate:?}: {share} of the change is not there yet");
     }
-    let share = f64::from(trail) / f64::from(change);
-    eprintln!(
-        "{share:.3} of a change of {change}; whole picture {:.3}",
-        f64::from(difference(&last, &now)) / now.len() as f64
-    );
-    assert!(change > 20_000, "{change}");
-    assert!(share < 0.33, "{share} of the change is not there yet");
 }
 
 /// A wall that flies to the right, by its node or by the joint of its skin.
