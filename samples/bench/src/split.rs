@@ -32,7 +32,7 @@ pub(super) fn measure(setup: &Setup, args: &SplitArgs) -> Result<Table, BenchErr
     }
     missing.into_iter().for_each(|note| table.add_note(note));
     table.add_note(format!("medians of {runs} interleaved frames; at most {most} triangles per part"));
-    table.add_note("limit: 1.15x on the H200, 1.3x on the software driver");
+    table.add_note("limit: 1.15x");
     Ok(table)
 }
 

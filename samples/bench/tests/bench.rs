@@ -177,7 +177,12 @@ fn growth_is_measured_for_every_group_and_plotted() {
     for (title, expected) in [
         (
             "instances of one TLAS",
-            &["created and built, lvk", "one moved, refit, lvk", "the same rays traced, lvk"][..],
+            &[
+                "created and built, lvk",
+                "one moved, refit, lvk",
+                "the same rays traced, lvk",
+                "the same rays, GPU time, lvk",
+            ][..],
         ),
         (
             "textures alive",
@@ -198,7 +203,12 @@ fn growth_is_measured_for_every_group_and_plotted() {
         ),
         (
             "triangles of one BLAS",
-            &["BLAS created and built, lvk", "first trace, lvk", "memory of the BLAS, lvk"],
+            &[
+                "BLAS created and built, lvk",
+                "first trace, lvk",
+                "traced again, GPU time, lvk",
+                "memory of the BLAS, lvk",
+            ],
         ),
         ("triangles of a loaded OBJ file", &[]),
     ] {
