@@ -7,7 +7,7 @@
 #include "viewer/random.glsl"
 #include "viewer/thin.glsl"
 
-// True if the ray goes on behind the triangle. A ray that looks for the nearest surface meets a share of alpha of all rays, by
+// True if the ray goes on behind the triangle. A ray from the eye passes through the back of a single-sided surface. A ray that looks for the nearest surface meets a share of alpha of all rays, by
 // chance; a shadow ray goes through, with less light.
 bool passesThrough(Hit hit, vec3 direction, inout Payload payload) {
     Instance instance = frame.instances.at[hit.instance];
@@ -25,7 +25,7 @@ bool passesThrough(Hit hit, vec3 direction, inout Payload payload) {
     AttributesArray all = AttributesArray(geometry.attributes);
     vec3 weights = weightsOf(hit.barycentrics);
     Texcoords texcoords = texcoordsOf(all, corners, weights);
-    vec4 color = baseColorOf(geometry.material, all, corners, weights, texcoords, 0.0);
+    vec4 color = baseColorOf(geometry.material, all, corners, weights, texcoords, vec2(0.0));
     if ((flags & kAlphaMask) != 0u && color.a < frame.materials.at[geometry.material].alphaCutoff) {
         return true;
     }

@@ -54,7 +54,7 @@ Arriving drawEmitter(vec3 position, float choice, vec2 u) {
     float cosine = area > 0.0 ? abs(dot(across, direction)) / area : 0.0;
     float density = emitterDensity(geometry.emissionWeight, distance, cosine);
     Texcoords texcoords = texcoordsOf(AttributesArray(geometry.attributes), corners, weights);
-    vec3 emission = frame.materials.at[geometry.material].emission * texelOf(geometry.material, kSlotEmission, texcoords, 0.0).rgb;
+    vec3 emission = frame.materials.at[geometry.material].emission * texelOf(geometry.material, kSlotEmission, texcoords, vec2(0.0)).rgb;
     return Arriving(direction, distance, cosine > 1e-6 && density > 0.0 ? emission / density : vec3(0.0), density);
 }
 

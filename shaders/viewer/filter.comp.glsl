@@ -109,8 +109,8 @@ void filterPixel(uvec2 at) {
     if (isLast) {
         composePixel(place, blurredMatte.rgb, blurredMirrored.rgb);
     }
-    // After the last step only views of the light read them.
-    if (!isLast || frame.view != kViewLight) {
+    // After the last step only views of this light read it.
+    if (!isLast || frame.view == kViewMatte || frame.view == kViewMirrored) {
         frame.planes.at[planePlace(kPlaneMatte + to, place)] = blurredMatte;
         frame.planes.at[planePlace(kPlaneMirrored + to, place)] = blurredMirrored;
     }

@@ -269,7 +269,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     vec3 boxMin; // around the scene
     vec3 boxMax;
     float occlusionDistance; // of surfaces that take no ambient light from each other
-    uint lightRate; // pixels for each that finds light in a frame: 1 or 4 of light_turn.glsl
+    uint lightTurns; // frames from one turn of a pixel to find light to the next: 1 or kTurns of light_turn.glsl
 };
 
 layout(push_constant, scalar) uniform PushConstants {

@@ -64,6 +64,11 @@ vec3 normalToWorld(Instance instance, vec3 n) {
     return instance.normalColumns[0] * n.x + instance.normalColumns[1] * n.y + instance.normalColumns[2] * n.z;
 }
 
+// True for an instance that turns its triangles over.
+bool mirrors(Instance instance) {
+    return dot(cross(instance.rows[0].xyz, instance.rows[1].xyz), instance.rows[2].xyz) < 0.0;
+}
+
 // A normal of a triangle on its front, of any length. The front is where the triangle turns counter-clockwise, before instances mirror it.
 vec3 outwards(Instance instance, Geometry geometry, uvec3 corners) {
     vec3 a = positionOf(geometry, corners.x);

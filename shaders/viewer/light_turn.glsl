@@ -5,18 +5,20 @@
 #include "viewer/frame.glsl"
 #include "viewer/random.glsl"
 
+// Turns, each of one pixel of 2 x 2.
+const uint kTurns = 4u;
 // Set in the number of a sample that a pixel has out of turn.
 const uint kOutOfTurn = 0x80000000u;
 
 bool takesTurns() {
-    return frame.lightRate > 1u;
+    return frame.lightTurns == kTurns;
 }
 
 // True if it is a pixel's turn. Each has one in every four frames, in another order each time: places within pixels repeat too.
 bool isTurn(uvec2 pixel) {
     uint corner = ((pixel.x ^ pixel.y) & 1u) << 1 | (pixel.y & 1u);
-    uint order = hashWord(frame.frameNumber >> 2);
-    return !takesTurns() || ((corner ^ order ^ frame.frameNumber) & 3u) == 0u;
+    uint order = hashWord(frame.frameNumber / kTurns);
+    return !takesTurns() || (corner ^ order ^ frame.frameNumber) % kTurns == 0u;
 }
 
 // The number of the first sample of a pixel in this frame. Samples in turn have numbers that follow each other, so that they are spread
@@ -25,7 +27,7 @@ uint firstSample(uvec2 pixel) {
     if (!takesTurns()) {
         return frame.sampleNumber;
     }
-    return isTurn(pixel) ? frame.frameNumber >> 2 : kOutOfTurn | frame.frameNumber;
+    return isTurn(pixel) ? frame.frameNumber / kTurns : kOutOfTurn | frame.frameNumber;
 }
 
 // Of `count` pixels in a row, number `at` if the even ones come first.

@@ -19,7 +19,7 @@ void wantMip(uint image, float mip) {
 }
 
 // The texel that slot `slot` of the material has there, or white.
-vec4 texelOf(uint material, uint slot, Texcoords texcoords, float footprint) {
+vec4 texelOf(uint material, uint slot, Texcoords texcoords, vec2 footprints) {
     uint number = frame.materials.at[material].slots[slot];
     if (number == kNoTexture) {
         return vec4(1.0);
@@ -28,6 +28,7 @@ vec4 texelOf(uint material, uint slot, Texcoords texcoords, float footprint) {
     vec4 columns = frame.slots.at[number].columns;
     vec2 place = columns.xy * texcoord.x + columns.zw * texcoord.y + frame.slots.at[number].offset;
     float mip = 0.0;
+    float footprint = footprints[frame.slots.at[number].set];
     if (footprint > 0.0) {
         vec2 texels = vec2(frame.slots.at[number].extent);
         float stretch = sqrt(abs(columns.x * columns.w - columns.y * columns.z) * texels.x * texels.y);
@@ -38,9 +39,9 @@ vec4 texelOf(uint material, uint slot, Texcoords texcoords, float footprint) {
     return textureBindless2DLod(frame.slots.at[number].tex, frame.slots.at[number].smp, place, residentMip);
 }
 
-vec4 baseColorOf(uint material, AttributesArray all, uvec3 corners, vec3 weights, Texcoords texcoords, float footprint) {
+vec4 baseColorOf(uint material, AttributesArray all, uvec3 corners, vec3 weights, Texcoords texcoords, vec2 footprints) {
     return frame.materials.at[material].baseColor * vertexColor(all, corners, weights) *
-           texelOf(material, kSlotBaseColor, texcoords, footprint);
+           texelOf(material, kSlotBaseColor, texcoords, footprints);
 }
 
 #endif

@@ -16,7 +16,7 @@ const uint kViewSteps = 7u; // steps of rays, which another pass counts
 
 // Two planes of the same kind are those of this frame and of the one before, in turn.
 const uint kPlaneSurface = 0u; // and 1: normal, distance, instance, roughness
-const uint kPlaneMatteHistory = 2u; // and 3: mean light of matte layers over their albedo, and the number of frames in it
+const uint kPlaneMatteHistory = 2u; // and 3: mean light of matte layers over their albedo, and the number of samples in it
 const uint kPlaneMirroredHistory = 4u; // and 5: likewise all other light over its share
 const uint kPlaneMoments = 6u; // and 7: means of both brightnesses and of their squares
 const uint kPlaneColor = 8u; // and 9: means of pictures, and the number of frames in it

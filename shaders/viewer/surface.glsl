@@ -49,7 +49,7 @@ vec3 mappedNormal(vec3 texel, float scale, vec3 t, vec3 b, vec3 normal) {
 }
 
 // Turns the surface by its normal maps, and finds the direction of its anisotropy.
-void setDetails(inout Surface surface, vec3 tangent, float side, Texcoords texcoords, float footprint, inout vec3 normal,
+void setDetails(inout Surface surface, vec3 tangent, float side, Texcoords texcoords, vec2 footprints, inout vec3 normal,
                 inout vec3 coatNormal) {
     MaterialArray all = frame.materials;
     uint number = surface.material;
@@ -63,18 +63,18 @@ void setDetails(inout Surface surface, vec3 tangent, float side, Texcoords texco
     vec3 b = side * cross(normal, t);
     vec3 smoothed = normal;
     if (all.at[number].slots[kSlotNormal] != kNoTexture) {
-        vec3 texel = texelOf(number, kSlotNormal, texcoords, footprint).xyz;
+        vec3 texel = texelOf(number, kSlotNormal, texcoords, footprints).xyz;
         normal = mappedNormal(texel, all.at[number].normalScale, t, b, smoothed);
     }
     if (all.at[number].slots[kSlotCoatNormal] != kNoTexture) {
-        vec3 texel = texelOf(number, kSlotCoatNormal, texcoords, footprint).xyz;
+        vec3 texel = texelOf(number, kSlotCoatNormal, texcoords, footprints).xyz;
         coatNormal = mappedNormal(texel, all.at[number].coatNormalScale, t, b, smoothed);
     }
     surface.tangent = surface.tangent.x * t + surface.tangent.y * b;
 }
 
 void setNormals(inout Surface surface, Instance instance, Geometry geometry, uvec3 corners, vec3 weights,
-                Texcoords texcoords, vec3 view, float footprint) {
+                Texcoords texcoords, vec3 view, vec2 footprints) {
     AttributesArray all = AttributesArray(geometry.attributes);
     vec3 smoothed = weights.x * unpackedNormal(all.at[corners.x].normal) + weights.y * unpackedNormal(all.at[corners.y].normal) +
                     weights.z * unpackedNormal(all.at[corners.z].normal);
@@ -89,14 +89,14 @@ void setNormals(inout Surface surface, Instance instance, Geometry geometry, uve
                        weights.y * unpackedNormal(all.at[corners.y].tangent & ~1u) +
                        weights.z * unpackedNormal(all.at[corners.z].tangent & ~1u);
         float side = (all.at[corners.x].tangent & 1u) != 0u ? -1.0 : 1.0;
-        setDetails(surface, vectorToWorld(instance, tangent), surface.isFront ? side : -side, texcoords, footprint, normal, coatNormal);
+        setDetails(surface, vectorToWorld(instance, tangent), surface.isFront ? side : -side, texcoords, footprints, normal, coatNormal);
     }
     surface.normal = seenNormal(normal, surface.geometricNormal, view);
     surface.coatNormal = seenNormal(coatNormal, surface.geometricNormal, view);
 }
 
 // Roughness along the tangent and across it, and that of both together.
-void setRoughness(inout Surface surface, Texcoords texcoords, float footprint) {
+void setRoughness(inout Surface surface, Texcoords texcoords, vec2 footprints) {
     MaterialArray all = frame.materials;
     uint number = surface.material;
     surface.tangent = vec3(0.0);
@@ -104,7 +104,7 @@ void setRoughness(inout Surface surface, Texcoords texcoords, float footprint) {
     if (all.at[number].anisotropy > 0.0) {
         vec3 texel = vec3(1.0, 0.5, 1.0);
         if (all.at[number].slots[kSlotAnisotropy] != kNoTexture) {
-            texel = texelOf(number, kSlotAnisotropy, texcoords, footprint).xyz;
+            texel = texelOf(number, kSlotAnisotropy, texcoords, footprints).xyz;
         }
         vec2 along = texel.xy * 2.0 - 1.0;
         float length2 = dot(along, along);
@@ -120,14 +120,14 @@ void setRoughness(inout Surface surface, Texcoords texcoords, float footprint) {
 }
 
 // What a thin film does to the reflectance straight on, for the angle of the view.
-void addFilm(inout Surface surface, Texcoords texcoords, float footprint, vec3 view) {
+void addFilm(inout Surface surface, Texcoords texcoords, vec2 footprints, vec3 view) {
     MaterialArray all = frame.materials;
     uint number = surface.material;
     if ((surface.flags & kExtensions) == 0u || all.at[number].film <= 0.0) {
         return;
     }
-    float share = all.at[number].film * texelOf(number, kSlotFilm, texcoords, footprint).r;
-    float place = texelOf(number, kSlotFilmThickness, texcoords, footprint).g;
+    float share = all.at[number].film * texelOf(number, kSlotFilm, texcoords, footprints).r;
+    float place = texelOf(number, kSlotFilmThickness, texcoords, footprints).g;
     float thickness = mix(all.at[number].filmThickness.x, all.at[number].filmThickness.y, place);
     float cosine = clamp(dot(surface.normal, view), 0.0, 1.0);
     surface.metalF0 = mix(surface.metalF0, filmF0(surface.metalF0, all.at[number].filmIor, thickness, cosine), share);
@@ -135,28 +135,28 @@ void addFilm(inout Surface surface, Texcoords texcoords, float footprint, vec3 v
 }
 
 // What most materials lack. `straight`: reflectance straight on by the index of refraction.
-void setExtensions(inout Surface surface, float straight, Texcoords texcoords, float footprint) {
+void setExtensions(inout Surface surface, float straight, Texcoords texcoords, vec2 footprints) {
     uint number = surface.material;
     MaterialArray all = frame.materials;
-    surface.transmission = all.at[number].transmission * texelOf(number, kSlotTransmission, texcoords, footprint).r;
-    float specular = all.at[number].specular * texelOf(number, kSlotSpecular, texcoords, footprint).a;
-    vec3 specularColor = all.at[number].specularColor * texelOf(number, kSlotSpecularColor, texcoords, footprint).rgb;
+    surface.transmission = all.at[number].transmission * texelOf(number, kSlotTransmission, texcoords, footprints).r;
+    float specular = all.at[number].specular * texelOf(number, kSlotSpecular, texcoords, footprints).a;
+    vec3 specularColor = all.at[number].specularColor * texelOf(number, kSlotSpecularColor, texcoords, footprints).rgb;
     surface.f0 = min(straight * specularColor, vec3(1.0)) * specular;
     surface.f90 = specular;
-    surface.coat = all.at[number].coat * texelOf(number, kSlotCoat, texcoords, footprint).r;
-    surface.coatRoughness = all.at[number].coatRoughness * texelOf(number, kSlotCoatRoughness, texcoords, footprint).g;
-    surface.sheenColor = all.at[number].sheenColor * texelOf(number, kSlotSheenColor, texcoords, footprint).rgb;
-    surface.sheenRoughness = all.at[number].sheenRoughness * texelOf(number, kSlotSheenRoughness, texcoords, footprint).a;
+    surface.coat = all.at[number].coat * texelOf(number, kSlotCoat, texcoords, footprints).r;
+    surface.coatRoughness = all.at[number].coatRoughness * texelOf(number, kSlotCoatRoughness, texcoords, footprints).g;
+    surface.sheenColor = all.at[number].sheenColor * texelOf(number, kSlotSheenColor, texcoords, footprints).rgb;
+    surface.sheenRoughness = all.at[number].sheenRoughness * texelOf(number, kSlotSheenRoughness, texcoords, footprints).a;
 }
 
-void setMaterial(inout Surface surface, Texcoords texcoords, float footprint) {
+void setMaterial(inout Surface surface, Texcoords texcoords, vec2 footprints) {
     uint number = surface.material;
     MaterialArray all = frame.materials;
-    vec4 metalRough = texelOf(number, kSlotMetalRough, texcoords, footprint);
+    vec4 metalRough = texelOf(number, kSlotMetalRough, texcoords, footprints);
     surface.metalness = clamp(all.at[number].metalness * metalRough.b, 0.0, 1.0);
     surface.roughness = clamp(all.at[number].roughness * metalRough.g, 0.0, 1.0);
-    setRoughness(surface, texcoords, footprint);
-    surface.emission = all.at[number].emission * texelOf(number, kSlotEmission, texcoords, footprint).rgb;
+    setRoughness(surface, texcoords, footprints);
+    surface.emission = all.at[number].emission * texelOf(number, kSlotEmission, texcoords, footprints).rgb;
     surface.ior = all.at[number].ior;
     surface.metalF0 = surface.baseColor;
     float straight = (surface.ior - 1.0) / (surface.ior + 1.0);
@@ -168,8 +168,19 @@ void setMaterial(inout Surface surface, Texcoords texcoords, float footprint) {
     surface.sheenColor = vec3(0.0);
     surface.sheenRoughness = 0.0;
     if ((surface.flags & kExtensions) != 0u) {
-        setExtensions(surface, straight * straight, texcoords, footprint);
+        setExtensions(surface, straight * straight, texcoords, footprints);
     }
+}
+
+// Texture coordinates that a ray covers whose cone is `width` wide on a triangle, of each set: the root of their area.
+vec2 footprintsOf(AttributesArray all, uvec3 corners, float area, float width) {
+    vec2 footprints;
+    for (uint set = 0u; set < 2u; ++set) {
+        vec2 e1 = all.at[corners.y].texcoords[set] - all.at[corners.x].texcoords[set];
+        vec2 e2 = all.at[corners.z].texcoords[set] - all.at[corners.x].texcoords[set];
+        footprints[set] = width * sqrt(abs(e1.x * e2.y - e1.y * e2.x) / max(area, 1e-30));
+    }
+    return footprints;
 }
 
 // `width`: of the ray at the surface; 0 for texels of the largest mip.
@@ -194,17 +205,14 @@ Surface surfaceAt(Hit hit, vec3 direction, float width) {
     surface.isFront = dot(front, direction) < 0.0;
     surface.geometricNormal = surface.isFront ? front : -front;
     Texcoords texcoords = texcoordsOf(all, corners, weights);
-    float footprint = 0.0;
+    vec2 footprints = vec2(0.0);
     if (width > 0.0) {
-        vec2 e1 = all.at[corners.y].texcoords[0] - all.at[corners.x].texcoords[0];
-        vec2 e2 = all.at[corners.z].texcoords[0] - all.at[corners.x].texcoords[0];
-        float density = sqrt(abs(e1.x * e2.y - e1.y * e2.x) / max(area, 1e-30));
-        footprint = density * width / sqrt(max(abs(dot(front, direction)), 0.05));
+        footprints = footprintsOf(all, corners, area, width / sqrt(max(abs(dot(front, direction)), 0.05)));
     }
-    surface.baseColor = baseColorOf(surface.material, all, corners, weights, texcoords, footprint).rgb;
-    setMaterial(surface, texcoords, footprint);
-    setNormals(surface, instance, geometry, corners, weights, texcoords, -direction, footprint);
-    addFilm(surface, texcoords, footprint, -direction);
+    surface.baseColor = baseColorOf(surface.material, all, corners, weights, texcoords, footprints).rgb;
+    setMaterial(surface, texcoords, footprints);
+    setNormals(surface, instance, geometry, corners, weights, texcoords, -direction, footprints);
+    addFilm(surface, texcoords, footprints, -direction);
     return surface;
 }
 

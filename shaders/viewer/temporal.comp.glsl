@@ -2,9 +2,9 @@
 // Variance-Guided Filtering", 2017).
 #include "viewer/history.glsl"
 
-// Frames in the mean of matte layers while the camera moves.
-const float kMostFrames = 48.0;
-// Of other layers, whose picture moves otherwise than their surface: until a highlight has moved by its width, but these at least.
+// Samples in the mean of matte layers while the camera moves.
+const float kMostSamples = 48.0;
+// Frames of other layers, whose picture moves otherwise than their surface: until a highlight has moved by its width, but these at least.
 const float kLeastMirrorFrames = 2.0;
 // While something else moves, whose light and shadow move with it.
 const float kMostMovingFrames = 16.0;
@@ -18,12 +18,13 @@ const float kMostErrors = 2.5;
 const float kLeastChange = 0.03; // of the light
 const int kNearbyPixels = 2;
 // While it stands.
-const float kMostStillFrames = 65536.0;
-// Frames before the variance over time says enough.
-const float kFirstFrames = 4.0;
-// Frames of which a mean holds samples, as a number of samples: a pixel has one in each frame, or in some.
+const float kMostStillSamples = 65536.0;
+// Samples before the variance over time says enough.
+const float kFirstSamples = 4.0;
+
+// The number of samples that a pixel has in so many frames, by turns.
 float samplesIn(float frames) {
-    return max(frames / float(frame.lightRate), 1.0);
+    return max(frames / float(frame.lightTurns), 1.0);
 }
 
 struct History {
@@ -70,13 +71,18 @@ Nearby nearbyLight(ivec2 pixel, ivec2 before, Seen seen) {
     return nearby;
 }
 
+// Fewest samples around a pixel that say whether light has changed.
+const float kFewestNearby = 4.0;
+
 // True for matte and mirrored light that has changed: the mean around a pixel differs by more than noise and rounding do.
 bvec2 hasChanged(Nearby nearby) {
     float count = max(nearby.count, 1.0);
     vec2 mean = nearby.sum / count;
     vec2 before = nearby.before / count;
     vec2 error = sqrt(max(nearby.squares / count - mean * mean, 0.0) / count);
-    return greaterThan(abs(mean - before), max(kMostErrors * error, kLeastChange * max(mean, before)));
+    bool saysEnough = nearby.count >= kFewestNearby;
+    bvec2 differs = greaterThan(abs(mean - before), max(kMostErrors * error, kLeastChange * max(mean, before)));
+    return bvec2(saysEnough && differs.x, saysEnough && differs.y);
 }
 
 const History kNoHistory = History(vec4(0.0), vec4(0.0), vec4(0.0));
@@ -135,30 +141,30 @@ void temporalPixel(uvec2 at) {
     vec3 point = seenPoint(frame.camera, pixel, seen.distance);
     vec4 beforeAndTurn = frame.planes.at[planePlace(kPlaneBefore, place)];
     vec3 before = beforeAndTurn.xyz;
-    float matteFrames = frame.sceneMoves != 0u ? samplesIn(kMostMovingFrames) : kMostFrames;
-    float mirrorFrames = clamp(samplesIn(framesOfHighlight(seen, point, before)), kLeastMirrorFrames, matteFrames);
+    float mostMatte = frame.sceneMoves != 0u ? samplesIn(kMostMovingFrames) : kMostSamples;
+    float mostMirrored = min(samplesIn(max(framesOfHighlight(seen, point, before), kLeastMirrorFrames)), mostMatte);
     if (frame.frameNumber > 0u && !isSky(seen)) {
         vec2 from = vec2(pixel) + 0.5 - motionOf(point, before);
         history = historyAt(from, seen, before);
         if (frame.sceneMoves != 0u && history.matte.a > 0.0) {
-            float turnFrames = samplesIn(max(kMostTurn / max(beforeAndTurn.w, 1e-6), kLeastTurnFrames));
-            float changedFrames = min(turnFrames, samplesIn(kMostChangedFrames));
+            float ofTurn = samplesIn(max(kMostTurn / max(beforeAndTurn.w, 1e-6), kLeastTurnFrames));
+            float ofChange = min(ofTurn, samplesIn(kMostChangedFrames));
             bvec2 changed = hasChanged(nearbyLight(pixel, ivec2(floor(from)), seen));
-            matteFrames = min(matteFrames, changed.x ? changedFrames : turnFrames);
-            mirrorFrames = min(mirrorFrames, changed.y ? changedFrames : turnFrames);
+            mostMatte = min(mostMatte, changed.x ? ofChange : ofTurn);
+            mostMirrored = min(mostMirrored, changed.y ? ofChange : ofTurn);
         }
     }
     bool isStill = frame.stillCount > 0u;
     if (isSample(matte)) {
-        history.matte = extended(history.matte, matte.rgb, isStill ? kMostStillFrames : matteFrames);
-        history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillFrames : mirrorFrames);
+        history.matte = extended(history.matte, matte.rgb, isStill ? kMostStillSamples : mostMatte);
+        history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillSamples : mostMirrored);
         vec2 bright = vec2(brightness(matte.rgb), brightness(mirrored));
         history.moments = mix(history.moments, vec4(bright, bright * bright), 1.0 / vec2(history.matte.a, history.mirrored.a).xyxy);
     }
     vec2 counts = max(vec2(history.matte.a, history.mirrored.a), 1.0);
-    // Of the mean. A few frames say little about how much their light varies.
+    // Of the mean. A few samples say little about how much their light varies.
     vec2 variance = max(history.moments.zw - history.moments.xy * history.moments.xy, 0.0);
-    vec2 few = max(kFirstFrames / counts - 1.0, 0.0) * history.moments.xy * history.moments.xy;
+    vec2 few = max(kFirstSamples / counts - 1.0, 0.0) * history.moments.xy * history.moments.xy;
     variance = variance / counts + few;
     frame.planes.at[currentPlane(kPlaneMatteHistory, place)] = history.matte;
     frame.planes.at[currentPlane(kPlaneMirroredHistory, place)] = history.mirrored;

@@ -2,7 +2,6 @@
 #ifndef VIEWER_TRACE_PIPELINE
 #define VIEWER_TRACE_PIPELINE
 
-#include "viewer/hit.glsl"
 #include "viewer/nearest_flags.glsl"
 
 layout(location = 0) rayPayloadEXT Payload payload;

@@ -11,7 +11,11 @@ void main() {
     uvec2 pixel = uvec2(gl_FragCoord.xy);
     Instance instance = frame.instances.at[inTriangle.x];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + argument];
-    if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend | kSingleSided)) != 0u) {
+    uint flags = frame.materials.at[geometry.material].flags;
+    if ((flags & kSingleSided) != 0u && gl_FrontFacing == mirrors(instance)) {
+        discard;
+    }
+    if ((flags & (kAlphaMask | kAlphaBlend)) != 0u) {
         Payload payload;
         payload.seed = nearestSeed(hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)), true);
         Hit hit = Hit(inTriangle.x, argument, inTriangle.y, inBarycentrics, 0.0);

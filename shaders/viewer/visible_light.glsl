@@ -14,7 +14,7 @@ const float kBrightestPath = 12.0;
 // Light that a path brings to the eye. The bound grows with the samples of a still, by the fourth root of their number: a spot fades
 // before it is seen, and the mean still comes to that of all paths.
 vec3 boundedLight(vec3 light) {
-    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount / frame.lightRate)));
+    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount / frame.lightTurns)));
     float most = largest(light) * frame.exposure;
     return most > bound ? light * (bound / most) : light;
 }
@@ -76,6 +76,8 @@ bool findsLight(uint place, Seen seen, vec3 pointBefore) {
     if (isTurn(pixel) || frame.frameNumber == 0u || (usesCache() && isUpdating(place))) {
         return true;
     }
+    // As the pass over time reads it.
+    seen = unpackedSeen(packedSeen(seen));
     vec3 point = seenPoint(frame.camera, ivec2(pixel), seen.distance);
     return !hasHistory(vec2(pixel) + 0.5 - motionOf(point, pointBefore), seen, pointBefore);
 }
@@ -200,11 +202,11 @@ bool advance(inout Path path, uint place, inout Random random) {
     if (isFirst) {
         vec4 before = pointBefore(hit, frame.camera.eye + hit.distance * path.direction);
         storePoint(place, before);
-        isWithoutLight = !findsLight(place, seen, before.xyz);
         if (isUnlit) {
             endUnlit(place, seen, surface.baseColor);
             return false;
         }
+        isWithoutLight = !findsLight(place, seen, before.xyz);
     } else {
         vec3 emitted = isUnlit ? surface.baseColor : emissionShare(path, hit, surface) * surface.emission;
         path.radiance += path.throughput * emitted;

@@ -78,8 +78,8 @@ pub struct ViewerArgs {
     #[arg(long, value_enum, default_value_t = IndirectLight::default())]
     pub indirect: IndirectLight,
 
-    /// Pixels that find light in each frame of the hybrid method: all, or one of each 2 x 2 by turns, with a fourth of the rays. Each then
-    /// has a fourth of the samples
+    /// Pixels that find light in each frame of the hybrid method: all, or one of each 2 x 2 by turns and those that the frame before did not
+    /// see. Each then has about a fourth of the samples
     #[arg(long, value_enum, default_value_t = LightRate::default())]
     pub light_rate: LightRate,
 

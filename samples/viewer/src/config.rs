@@ -1,7 +1,7 @@
 //! The configuration of the sample.
 
 use clap::ValueEnum;
-use lvk::Capabilities;
+use lvk::{Capabilities, RayQueryPath};
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
 
@@ -49,6 +49,11 @@ pub enum Content {
     /// Steps of the ray of each pixel through the acceleration structures, from black over blue, green and red to white at 512 and
     /// more. Software ray queries count them; where a device traverses, all is black.
     Steps,
+}
+
+/// True if a device counts the steps of its rays, for [`Content::Steps`]: those of the library's own traversal.
+pub(crate) fn counts_steps(capabilities: &Capabilities) -> bool {
+    capabilities.ray_query_path == RayQueryPath::Software
 }
 
 /// Where the hybrid method takes the light from that surfaces beyond the visible ones scatter.
@@ -189,8 +194,8 @@ impl ViewerConfig {
         self.method == Method::Hybrid && self.indirect == IndirectLight::AmbientOcclusion
     }
 
-    /// Pixels for each that finds light in a frame.
-    pub(crate) fn pixels_for_each_with_light(&self) -> u32 {
+    /// Frames from one turn of a pixel to find light to the next.
+    pub(crate) fn light_turns(&self) -> u32 {
         match (self.method, self.light_rate) {
             (Method::Hybrid, LightRate::Quarter) => 4,
             (Method::PathTrace, _) | (_, LightRate::Full) => 1,

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use lvk::{Context, RayQueryPath};
+use lvk::Context;
 use lvk_gltf::Model;
 use lvk_samples::app::cli::{ReadySample, warn};
 use lvk_samples::app::progress::Progress;
@@ -10,7 +10,7 @@ use lvk_samples::app::run_error::RunError;
 use lvk_samples::hybrid::RayPath;
 
 use crate::args::{LightArgs, SkyArg, ViewerArgs};
-use crate::config::{Content, ViewerConfig};
+use crate::config::{Content, ViewerConfig, counts_steps};
 use crate::light::{Environment, EnvironmentError, SunSetting};
 use crate::model::{ModelError, load, showcase};
 use crate::names::{animation_place, camera_place};
@@ -61,7 +61,7 @@ impl Request {
         let scene = self.scene(model).map_err(RunError::input)?;
         let mut viewer = Viewer::new(ctx, scene, &config)?;
         warn_beside(progress, viewer.warnings());
-        if config.content == Content::Steps && ctx.capabilities().ray_query_path == RayQueryPath::Hardware {
+        if config.content == Content::Steps && !counts_steps(ctx.capabilities()) {
             let text = "--view steps is black: the device counts no steps of its rays; --rt software does";
             warn_beside(progress, &[text.to_owned()]);
         }

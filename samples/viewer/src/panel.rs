@@ -1,5 +1,6 @@
 //! What the panel of the window shows of the viewer.
 
+use clap::ValueEnum as _;
 use egui::{Color32, RichText};
 use lvk_gltf::Animation;
 
@@ -80,25 +81,21 @@ pub(crate) fn choose_camera(ui: &mut egui::Ui, cameras: &[ModelCamera], chosen: 
     (choice != chosen).then_some(choice)
 }
 
-/// Lays out the settings that can change while the sample runs.
-pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
+/// Lays out the settings that can change while the sample runs. `counts_steps`: the device counts steps of rays.
+pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig, counts_steps: bool) {
     ui.horizontal(|ui| {
         ui.selectable_value(&mut config.method, Method::Hybrid, "hybrid");
         ui.selectable_value(&mut config.method, Method::PathTrace, "path tracer");
     });
     if config.method == Method::Hybrid {
         egui::ComboBox::from_label("view").selected_text(format!("{:?}", config.content)).show_ui(ui, |ui| {
-            for content in [
-                Content::Light,
-                Content::Normals,
-                Content::Roughness,
-                Content::Motion,
-                Content::Albedo,
-                Content::Matte,
-                Content::Mirrored,
-                Content::Steps,
-            ] {
-                ui.selectable_value(&mut config.content, content, format!("{content:?}"));
+            for content in Content::value_variants() {
+                // Without them all is black.
+                let is_enabled = counts_steps || *content != Content::Steps;
+                let name = format!("{content:?}");
+                ui.add_enabled_ui(is_enabled, |ui| ui.selectable_value(&mut config.content, *content, name))
+                    .response
+                    .on_disabled_hover_text("ray queries in software count steps: --rt software");
             }
         });
     }

@@ -314,6 +314,10 @@ impl Viewer {
         if config.bounces != before.bounces {
             self.done = 0;
         }
+        // The samples of a pixel have other numbers by turns: those of one rate would come again by the other.
+        if config.light_rate != before.light_rate {
+            (self.frame_number, self.done) = (0, 0);
+        }
         self.config = ViewerConfig { texture_budget: before.texture_budget, ..*config };
         Ok(())
     }
@@ -427,7 +431,7 @@ impl Viewer {
             ambient: self.shown.gpu.ambient(),
             occlusion_distance: OCCLUSION_SHARE
                 * self.shown.bounds.min.distance(self.shown.bounds.max).max(f32::MIN_POSITIVE),
-            light_rate: self.config.pixels_for_each_with_light(),
+            light_turns: self.config.light_turns(),
         })
     }
 

@@ -102,6 +102,75 @@ fn every_pixel_shows_its_surface_at_any_rate() {
     }
 }
 
+/// The numbers of samples differ by the rate: a still begins anew, so that none comes twice.
+#[test]
+fn a_still_begins_anew_at_another_rate() {
+    let Some(ctx) = software_device() else { return };
+    let model = still_life();
+    let config = config((Method::Hybrid, RayPath::Query), &view(1));
+    let config = ViewerConfig { is_progressive: true, ..config };
+    let shown = |rates: &[LightRate]| {
+        let mut viewer = configured_viewer(&ctx, &config, &model, &environment(), &view(1));
+        for &light_rate in rates {
+            viewer.configure(&ViewerConfig { light_rate, ..config }).unwrap();
+            for _ in 0..5 {
+                headless::picture(&mut viewer).unwrap();
+            }
+        }
+        viewer.radiance().unwrap()
+    };
+    assert_eq!(shown(&[LightRate::Full, LightRate::Quarter]), shown(&[LightRate::Quarter]));
+}
+
+/// A matte floor under an even sky receives the light of the sky, and none that other layers would mirror.
+#[test]
+fn views_of_light_show_what_surfaces_receive() {
+    let Some(ctx) = software_device() else { return };
+    let floor = Builder::default().quad(
+        Vec3::new(-50.0, 0.0, 50.0),
+        Vec3::X * 100.0,
+        Vec3::NEG_Z * 100.0,
+        matte([0.2, 0.5, 0.8]),
+    );
+    let (model, sky) = (floor.model(), Environment::uniform([1.0, 2.0, 3.0]));
+    let view =
+        View { camera: Camera::looking_at([0.0, 2.0, 0.5], [0.0; 3], 40.0), size: [24, 16], samples: 64 };
+    for (content, expected) in [(Content::Matte, [1.0, 2.0, 3.0]), (Content::Mirrored, [0.0; 3])] {
+        let config = ViewerConfig { content, ..config((Method::Hybrid, RayPath::Query), &view) };
+        let mut viewer = configured_viewer(&ctx, &config, &model, &sky, &view);
+        headless::picture(&mut viewer).unwrap();
+        assert_close(&format!("{content:?}"), mean(&viewer.radiance().unwrap()), expected, 0.02);
+    }
+}
+
+/// Texels that are read by the second set of texture coordinates are as fine as those that are read by the first.
+#[test]
+fn mips_are_those_of_the_set_of_texture_coordinates() {
+    let Some(ctx) = software_device() else { return };
+    let stripes = (0..64 * 64).flat_map(|texel| if texel % 64 % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
+    let level = MipLevel { width: 64, height: 64, bytes: stripes.collect() };
+    let data = Arc::new(ImageData { format: TexelFormat::Rgba8, mips: vec![level] });
+    let often = TextureTransform { offset: [0.0; 2], rotation: 0.0, scale: [20.0; 2] };
+    let shown = |tex_coord: usize| {
+        let texture = TextureRef { image: 0, sampler: 0, tex_coord, transform: Some(often) };
+        let floor = Material { unlit: true, base_color_texture: Some(texture), ..matte([1.0; 3]) };
+        let mut model = Builder::default()
+            .quad(Vec3::new(-10.0, 0.0, 10.0), Vec3::X * 20.0, Vec3::NEG_Z * 20.0, floor)
+            .model();
+        model.images =
+            vec![Image { name: None, source: 0, color_space: ColorSpace::Srgb, data: data.clone() }];
+        model.samplers = vec![Sampler::default()];
+        if tex_coord == 1 {
+            // The first set has the same texels everywhere.
+            model.meshes[0].primitives[0].tex_coords.insert(0, vec![[0.0; 2]; 4]);
+        }
+        let camera = Camera::looking_at([0.0, 3.0, 8.0], [0.0; 3], 50.0);
+        let view = View { camera, size: [48, 32], samples: 1 };
+        radiance_by(&ctx, (Method::Hybrid, RayPath::Query), &model, &environment(), &view)
+    };
+    assert_eq!(shown(1), shown(0));
+}
+
 /// A dark floor in bright exposure returns all of the light that the path tracer finds, though it is far from the first bound of a path.
 #[test]
 fn dark_surfaces_in_bright_exposure_keep_their_light() {
@@ -178,9 +247,11 @@ fn rays_find_the_surfaces_that_the_rasteriser_finds() {
         let config = ViewerConfig { primary, ..config((Method::Hybrid, RayPath::Query), &view(1)) };
         configured_viewer(&ctx, &config, &model, &environment(), &view(1))
     });
-    for content in [Content::Normals, Content::Roughness, Content::Albedo] {
+    let contents = [Content::Normals, Content::Roughness, Content::Albedo];
+    let rates = [LightRate::Full, LightRate::Quarter];
+    for (light_rate, content) in rates.into_iter().flat_map(|rate| contents.map(|content| (rate, content))) {
         let [rays, raster] = viewers.each_mut().map(|viewer| {
-            viewer.configure(&ViewerConfig { content, ..*viewer.config() }).unwrap();
+            viewer.configure(&ViewerConfig { content, light_rate, ..*viewer.config() }).unwrap();
             headless::picture(viewer).unwrap();
             viewer.radiance().unwrap()
         });

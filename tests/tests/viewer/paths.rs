@@ -7,9 +7,9 @@ use lvk_samples::scene::Camera;
 use lvk_tests::device;
 use lvk_tests::rtx_sample::{contexts_and_paths, software_device};
 use lvk_viewer::light::{Environment, SunSetting};
-use lvk_viewer::{Method, ViewerConfig};
+use lvk_viewer::{LightRate, Method, ViewerConfig};
 
-use crate::scenes::{View, assert_close, mean, radiance, radiance_by, viewer};
+use crate::scenes::{View, assert_close, config, configured_viewer, mean, radiance, viewer};
 use crate::still_life::still_life;
 
 #[test]
@@ -20,14 +20,23 @@ fn all_paths_trace_the_same_light() {
     let view = View { camera, size: [60, 40], samples: 4 };
     let environment = Environment::day(&SunSetting::default());
     let model = still_life();
-    for method in [Method::PathTrace, Method::Hybrid] {
+    for (method, light_rate) in [
+        (Method::PathTrace, LightRate::Full),
+        (Method::Hybrid, LightRate::Full),
+        (Method::Hybrid, LightRate::Quarter),
+    ] {
         let all: Vec<_> = contexts_and_paths(&ctx, software.as_deref())
             .into_iter()
-            .map(|(ctx, path)| (path, radiance_by(ctx, (method, path), &model, &environment, &view)))
+            .map(|(ctx, path)| {
+                let config = ViewerConfig { light_rate, ..config((method, path), &view) };
+                let mut viewer = configured_viewer(ctx, &config, &model, &environment, &view);
+                headless::picture(&mut viewer).unwrap();
+                (path, viewer.radiance().unwrap())
+            })
             .collect();
         let (_, first) = &all[0];
         for (path, other) in &all[1..] {
-            assert_alike(&format!("{method:?} by {path:?}"), first, other);
+            assert_alike(&format!("{method:?} by {path:?}, {light_rate:?}"), first, other);
         }
     }
 }

@@ -335,7 +335,7 @@ lvk::shader_struct! {
         pub(crate) cell_share: f32,
         pub(crate) ambient: AmbientConstants,
         pub(crate) occlusion_distance: f32,
-        pub(crate) light_rate: u32,
+        pub(crate) light_turns: u32,
     }
 
     /// `PushConstants`.
