@@ -4,8 +4,9 @@
 
 // Samples in the mean of matte layers while the camera moves.
 const float kMostSamples = 48.0;
-// Frames of other layers, whose picture moves otherwise than their surface: until a highlight has moved by its width, but these at least.
-const float kLeastMirrorFrames = 2.0;
+// Of other layers, whose picture moves otherwise than their surface: those in which a highlight moves by its width, but these at least: of fewer
+// the picture of a moving eye is further from the reference.
+const float kLeastMirrorSamples = 2.0;
 // While something else moves, whose light and shadow move with it.
 const float kMostMovingFrames = 16.0;
 // While a surface turns: until it has turned by so many radians, but these at least.
@@ -142,7 +143,7 @@ void temporalPixel(uvec2 at) {
     vec4 beforeAndTurn = frame.planes.at[planePlace(kPlaneBefore, place)];
     vec3 before = beforeAndTurn.xyz;
     float mostMatte = frame.sceneMoves != 0u ? samplesIn(kMostMovingFrames) : kMostSamples;
-    float mostMirrored = min(samplesIn(max(framesOfHighlight(seen, point, before), kLeastMirrorFrames)), mostMatte);
+    float mostMirrored = min(max(samplesIn(framesOfHighlight(seen, point, before)), kLeastMirrorSamples), mostMatte);
     if (frame.frameNumber > 0u && !isSky(seen)) {
         vec2 from = vec2(pixel) + 0.5 - motionOf(point, before);
         history = historyAt(from, seen, before);
