@@ -10,6 +10,7 @@ mod cycles_scenes;
 mod depth_pyramid;
 mod dropped;
 mod emitters;
+mod features;
 mod furnace;
 mod hybrid;
 mod hybrid_materials;
