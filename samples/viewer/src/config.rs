@@ -194,7 +194,7 @@ impl ViewerConfig {
         self.method == Method::Hybrid && self.indirect == IndirectLight::AmbientOcclusion
     }
 
-    /// Frames from one turn of a pixel to find light to the next.
+    /// Frames from one turn of a pixel to find light to the next (`kTurns` in `shaders/viewer/light_turn.glsl`).
     pub(crate) fn light_turns(&self) -> u32 {
         match (self.method, self.light_rate) {
             (Method::Hybrid, LightRate::Quarter) => 4,
