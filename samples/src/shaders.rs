@@ -123,7 +123,6 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/light_turn",
     "viewer/lights",
     "viewer/material",
-    "viewer/nearest_flags",
     "viewer/occlusion",
     "viewer/path",
     "viewer/path_launch",

@@ -1,4 +1,4 @@
-// What a ray does at a triangle that may have holes: masks, coverage, thin glass, and backs that the eye does not see.
+// What a ray does at a triangle that may have holes: masks, coverage and thin glass.
 #ifndef VIEWER_CANDIDATE
 #define VIEWER_CANDIDATE
 
@@ -7,17 +7,13 @@
 #include "viewer/random.glsl"
 #include "viewer/thin.glsl"
 
-// True if the ray goes on behind the triangle. A ray from the eye passes through the back of a single-sided surface. A ray that looks for the nearest surface meets a share of alpha of all rays, by
+// True if the ray goes on behind the triangle. A ray that looks for the nearest surface meets a share of alpha of all rays, by
 // chance; a shadow ray goes through, with less light.
 bool passesThrough(Hit hit, vec3 direction, inout Payload payload) {
     Instance instance = frame.instances.at[hit.instance];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + hit.geometry];
     uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
     uint flags = frame.materials.at[geometry.material].flags;
-    bool isFromEye = payload.seed != kShadow && (payload.seed & kFromEye) != 0u;
-    if (isFromEye && (flags & kSingleSided) != 0u && dot(outwards(instance, geometry, corners), direction) > 0.0) {
-        return true;
-    }
     bool isPaneToShadows = payload.seed == kShadow && frame.materials.at[geometry.material].transmission > 0.0;
     if ((flags & (kAlphaMask | kAlphaBlend)) == 0u && !isPaneToShadows) {
         return false;

@@ -9,11 +9,12 @@ const float kPi = 3.14159265358979;
 
 // Bits of Geometry.flags.
 const uint kQuantised = 1u; // positions are four signed normalised numbers of 16 bits each
+const uint kSingleSided = 2u; // the eye does not see its back
+const uint kOfBothSides = 4u; // the mesh has double-sided surfaces too, so that rays cull none of its backs
 
 // Bits of Material.flags.
 const uint kAlphaMask = 1u; // holes where alpha is below the cutoff
 const uint kAlphaBlend = 2u; // alpha is the share of light that meets the surface
-const uint kSingleSided = 4u; // the eye does not see its back
 const uint kUnlit = 8u;
 const uint kTangents = 32u; // the surface has a direction: a normal map or anisotropy
 const uint kThin = 16u; // light that passes keeps its direction: there is no volume behind the surface

@@ -19,16 +19,10 @@ struct Hit {
 struct Payload {
     Hit hit;
     vec3 transmittance; // of what lies on the way of a shadow ray
-    uint seed; // of a ray that looks for the nearest surface, below kFromEye; with it for a ray from the eye; kShadow for a shadow ray
+    uint seed; // of a ray that looks for the nearest surface; kShadow for a shadow ray
 };
 
 const uint kShadow = 0xffffffffu;
-const uint kFromEye = 0x40000000u;
-
-// The seed of a ray that looks for the nearest surface. The eye does not see the back of single-sided surfaces.
-uint nearestSeed(uint random, bool isFromEye) {
-    return random >> 2 | (isFromEye ? kFromEye : 0u);
-}
 
 struct Triangle {
     uvec3 corners;

@@ -19,7 +19,7 @@ vec3 heat(float share) {
 
 void stepsPixel(uvec2 pixel) {
     lvkTraversalSteps = 0u;
-    traceWithin(frame.camera.eye, cameraDirection(frame.camera, pixel), 1e30, nearestSeed(0u, true));
+    traceWithin(frame.camera.eye, cameraDirection(frame.camera, pixel), 1e30, 0u, LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES);
     // Few steps and many differ by orders of magnitude.
     float share = log2(1.0 + float(lvkTraversalSteps)) / log2(1.0 + kMostSteps);
     frame.planes.at[planePlace(kPlaneShown, pixelPlace(ivec2(pixel)))] = vec4(heat(share), 1.0);

@@ -2,15 +2,15 @@
 #ifndef VIEWER_TRACE_PIPELINE
 #define VIEWER_TRACE_PIPELINE
 
-#include "viewer/nearest_flags.glsl"
+#include "viewer/hit.glsl"
 
 layout(location = 0) rayPayloadEXT Payload payload;
 
-// The nearest surface up to `range` away, at the distance `range` where there is none. `seed`: of nearestSeed().
-Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed) {
-    payload.seed = seed;
+// The nearest surface up to `range` away, at the distance `range` where there is none.
+Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed, uint flags) {
+    payload.seed = seed == kShadow ? 0u : seed;
     payload.hit.distance = range;
-    traceRayEXT(kTLAS[frame.tlas], nearestFlags(seed), 0xffu, 0, 0, 0, origin, 0.0, direction, range, 0);
+    traceRayEXT(kTLAS[frame.tlas], flags, 0xffu, 0, 0, 0, origin, 0.0, direction, range, 0);
     return payload.hit;
 }
 

@@ -7,7 +7,6 @@
 #include <lvk/ray_query.glsl>
 
 #include "viewer/candidate.glsl"
-#include "viewer/nearest_flags.glsl"
 
 // Of the ray under way.
 Payload payload;
@@ -24,11 +23,11 @@ void judgeCandidate(LvkRayQueryParameter query) {
     }
 }
 
-// The nearest surface up to `range` away, at the distance `range` where there is none. `seed`: of nearestSeed().
-Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed) {
-    payload.seed = seed;
+// The nearest surface up to `range` away, at the distance `range` where there is none.
+Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed, uint flags) {
+    payload.seed = seed == kShadow ? 0u : seed;
     LvkRayQuery query;
-    lvkRayQueryInitialize(query, frame.tlas, nearestFlags(seed), 0xffu, origin, 0.0, direction, range);
+    lvkRayQueryInitialize(query, frame.tlas, flags, 0xffu, origin, 0.0, direction, range);
     while (lvkRayQueryProceed(query)) {
     }
     Hit hit = Hit(kNothing, 0u, 0u, vec2(0.0), range);

@@ -11,13 +11,12 @@ void main() {
     uvec2 pixel = uvec2(gl_FragCoord.xy);
     Instance instance = frame.instances.at[inTriangle.x];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + argument];
-    uint flags = frame.materials.at[geometry.material].flags;
-    if ((flags & kSingleSided) != 0u && gl_FrontFacing == mirrors(instance)) {
+    if ((geometry.flags & kSingleSided) != 0u && gl_FrontFacing == mirrors(instance)) {
         discard;
     }
-    if ((flags & (kAlphaMask | kAlphaBlend)) != 0u) {
+    if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend)) != 0u) {
         Payload payload;
-        payload.seed = nearestSeed(hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)), true);
+        payload.seed = hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)) & 0x7fffffffu;
         Hit hit = Hit(inTriangle.x, argument, inTriangle.y, inBarycentrics, 0.0);
         if (passesThrough(hit, cameraDirection(frame.camera, pixel), payload)) {
             discard;

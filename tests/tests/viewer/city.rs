@@ -23,7 +23,7 @@ use crate::scenes::{View, viewer};
 /// Triangles of a structure on the phone of these tests.
 const PHONE_TRIANGLES: u64 = 2_000;
 
-fn tiny_city(blocks: u32, kinds: u32) -> Model {
+pub fn tiny_city(blocks: u32, kinds: u32) -> Model {
     let city = city(&CityConfig { blocks, kinds, seed: 3, texture_size: 64 }).unwrap();
     Model::from_bytes(&city.glb, None, &LoadOptions::default()).unwrap()
 }

@@ -115,6 +115,11 @@ impl Surface {
         })
     }
 
+    /// True for what is seen from both sides: what is as thin as a leaf, and twigs, whose ends are open.
+    fn is_double_sided(self) -> bool {
+        matches!(self, Self::Bark | Self::Leaf | Self::LightLeaf | Self::DarkLeaf | Self::Awning)
+    }
+
     /// The materials of the file. `texture` returns the reference to the texture of a pattern and its mean, if the file has it.
     pub(super) fn materials(texture: impl Fn(Pattern) -> Option<(Value, Vec3)>) -> Vec<Value> {
         Self::LOOKS.iter().map(|look| material(look, look.0.pattern().and_then(&texture))).collect()
@@ -122,7 +127,10 @@ impl Surface {
 }
 
 /// A material. With a texture, its mean colour is that of the surface.
-fn material((_, name, color, metalness, roughness, coat): &Look, texture: Option<(Value, Vec3)>) -> Value {
+fn material(
+    (surface, name, color, metalness, roughness, coat): &Look,
+    texture: Option<(Value, Vec3)>,
+) -> Value {
     let mean = texture.as_ref().map_or(Vec3::ONE, |(_, mean)| *mean);
     let [red, green, blue] = (Vec3::from(*color) / mean).to_array();
     let mut material = json!({
@@ -135,6 +143,9 @@ fn material((_, name, color, metalness, roughness, coat): &Look, texture: Option
     });
     if let Some((reference, _)) = texture {
         material["pbrMetallicRoughness"]["baseColorTexture"] = reference;
+    }
+    if surface.is_double_sided() {
+        material["doubleSided"] = json!(true);
     }
     if *coat > 0.0 {
         let clearcoat = json!({ "clearcoatFactor": coat, "clearcoatRoughnessFactor": 0.04 });

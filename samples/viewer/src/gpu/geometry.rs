@@ -12,7 +12,7 @@ use lvk_gltf::{AlphaMode, Bounds, Material, Model, Pose, Primitive};
 use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
 use super::emitters::{EmissiveMeshes, emission_color, emission_weight};
 use super::instances::MeshKey;
-use super::layout::{GpuAttributes, GpuGeometry, QUANTISED};
+use super::layout::{GpuAttributes, GpuGeometry, geometry_flag};
 use super::materials::is_single_sided;
 use super::vertices::{PackedPositions, attributes};
 use crate::model::{moved, movers};
@@ -71,6 +71,8 @@ struct Part {
     material: u32,
     is_opaque: bool,
     is_single_sided: bool,
+    /// Its mesh has double-sided primitives too.
+    is_of_both_sides: bool,
     /// Luminance of its light, if shadow rays look for it.
     emission_weight: f32,
 }
@@ -91,10 +93,10 @@ impl Arena {
             self.add(primitive, (number as u32, material), is_quantised, emission_weight);
         }
         let own = &mut self.parts[before..];
-        // Rays leave out all backs of an instance or none. Where only some are seen, the others have to be looked at one by one.
-        if own.iter().any(|part| !part.is_single_sided) {
-            own.iter_mut().for_each(|part| part.is_opaque &= !part.is_single_sided);
-        }
+        // Rays cull all backs of an instance or none.
+        let has_singles = own.iter().any(|part| part.is_single_sided);
+        let is_of_both_sides = has_singles && own.iter().any(|part| !part.is_single_sided);
+        own.iter_mut().for_each(|part| part.is_of_both_sides = is_of_both_sides);
         own.len()
     }
 
@@ -119,10 +121,21 @@ impl Arena {
             material: number,
             is_opaque: is_opaque(material),
             is_single_sided: is_single_sided(material),
+            is_of_both_sides: false,
         });
         *position_count += vertex_count;
         self.vertex_count += vertex_count;
         self.index_count += primitive.indices.len();
+    }
+}
+
+impl Part {
+    /// Bits of `Geometry.flags`.
+    fn flags(&self) -> u32 {
+        let set = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
+        set(self.is_quantised, geometry_flag::QUANTISED)
+            | set(self.is_single_sided, geometry_flag::SINGLE_SIDED)
+            | set(self.is_of_both_sides, geometry_flag::OF_BOTH_SIDES)
     }
 }
 
@@ -185,7 +198,7 @@ impl ArenaBuffers {
                 + (size_of::<GpuAttributes>() * part.first_attributes) as u64,
             indices: self.indices.address()? + INDEX * part.first_index as u64,
             material: part.material,
-            flags: if part.is_quantised { QUANTISED } else { 0 },
+            flags: part.flags(),
             emission_weight: part.emission_weight,
             _padding: 0,
         })

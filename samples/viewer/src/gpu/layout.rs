@@ -10,14 +10,18 @@ pub(crate) const NO_TEXTURE: u32 = u32::MAX;
 /// Surfaces of a path at most that update the radiance cache (`kMostUpdates`).
 const MOST_UPDATES: usize = 4;
 
-/// Bit of `Geometry.flags`: positions are `Snorm16x4`.
-pub(crate) const QUANTISED: u32 = 1;
+/// Bits of `Geometry.flags`.
+pub(crate) mod geometry_flag {
+    /// Positions are `Snorm16x4`.
+    pub(crate) const QUANTISED: u32 = 1;
+    pub(crate) const SINGLE_SIDED: u32 = 2;
+    pub(crate) const OF_BOTH_SIDES: u32 = 4;
+}
 
 /// Bits of `Material.flags`.
 pub(crate) mod material_flag {
     pub(crate) const ALPHA_MASK: u32 = 1;
     pub(crate) const ALPHA_BLEND: u32 = 2;
-    pub(crate) const SINGLE_SIDED: u32 = 4;
     pub(crate) const UNLIT: u32 = 8;
     pub(crate) const THIN: u32 = 16;
     pub(crate) const TANGENTS: u32 = 32;

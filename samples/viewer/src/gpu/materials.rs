@@ -166,7 +166,6 @@ fn flags(material: &Material) -> u32 {
     };
     let set = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     alpha
-        | set(is_single_sided(material), material_flag::SINGLE_SIDED)
         | set(material.unlit, material_flag::UNLIT)
         | set(is_thin(material), material_flag::THIN)
         | set(has_tangents(material), material_flag::TANGENTS)

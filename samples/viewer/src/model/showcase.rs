@@ -201,7 +201,7 @@ fn knot(builder: &mut Builder) {
         let forward = (line(t + 1e-2) - line(t - 1e-2)).normalize();
         let side = forward.cross(Vec3::Z).normalize();
         let (sine, cosine) = (v * TAU).sin_cos();
-        line(t) + 0.24 * (side * cosine + side.cross(forward) * sine)
+        line(t) + 0.24 * (side * cosine + forward.cross(side) * sine)
     });
     let mesh = builder.mesh("knot", &shape, copper);
     let upright = Quat::from_rotation_z(0.5 * PI);
