@@ -43,7 +43,7 @@ pub(crate) struct GpuMesh {
     pub(crate) geometry_count: u32,
     /// The box around it; `None` if its vertices move.
     pub(crate) bounds: Option<Bounds>,
-    /// The eye sees the back of none of its surfaces.
+    /// True if all surfaces are single-sided.
     pub(crate) is_single_sided: bool,
     pub(crate) blas: Holder<AccelStructHandle>,
 }
@@ -71,7 +71,7 @@ struct Part {
     material: u32,
     is_opaque: bool,
     is_single_sided: bool,
-    /// Its mesh has double-sided primitives too.
+    /// True if the mesh has double-sided primitives too.
     is_of_both_sides: bool,
     /// Luminance of its light, if shadow rays look for it.
     emission_weight: f32,
