@@ -123,6 +123,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/light_turn",
     "viewer/lights",
     "viewer/material",
+    "viewer/nearest_ray",
     "viewer/occlusion",
     "viewer/path",
     "viewer/path_launch",

@@ -1,4 +1,4 @@
-// What a ray does at a triangle that may have holes: masks, coverage and thin glass.
+// What a ray does at a triangle that may have holes: masks, coverage, thin glass, and backs that the eye does not see.
 #ifndef VIEWER_CANDIDATE
 #define VIEWER_CANDIDATE
 
@@ -14,8 +14,12 @@ bool passesThrough(Hit hit, vec3 direction, inout Payload payload) {
     Geometry geometry = frame.geometries.at[instance.firstGeometry + hit.geometry];
     uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
     uint flags = frame.materials.at[geometry.material].flags;
-    bool isPaneToShadows = payload.seed == kShadow && frame.materials.at[geometry.material].transmission > 0.0;
-    if ((flags & (kAlphaMask | kAlphaBlend)) == 0u && !isPaneToShadows) {
+    bool isShadow = payload.seed == kShadow;
+    if (!isShadow && (payload.seed & kJudgesBacks) != 0u && isUnseenBack(hit, direction)) {
+        return true;
+    }
+    bool isTransmissive = frame.materials.at[geometry.material].transmission > 0.0;
+    if ((flags & (kAlphaMask | kAlphaBlend)) == 0u && !(isShadow && isTransmissive)) {
         return false;
     }
     AttributesArray all = AttributesArray(geometry.attributes);
@@ -26,12 +30,12 @@ bool passesThrough(Hit hit, vec3 direction, inout Payload payload) {
         return true;
     }
     float covered = (flags & kAlphaBlend) != 0u ? clamp(color.a, 0.0, 1.0) : 1.0;
-    if (payload.seed != kShadow) {
-        uint place = hashWords(hashWords(payload.seed, hit.instance), hashWords(hit.geometry, hit.primitive));
+    if (!isShadow) {
+        uint place = hashWords(hashWords(payload.seed & ~kJudgesBacks, hit.instance), hashWords(hit.geometry, hit.primitive));
         return covered < 1.0 && unitFloat(place) >= covered;
     }
     vec3 through = vec3(0.0);
-    if (isPaneToShadows) {
+    if (isTransmissive) {
         // The same normal as where the path itself goes through.
         Surface surface = surfaceAt(hit, direction, 0.0);
         through = isPane(surface) ? paneTransmittance(surface, direction) : vec3(0.0);

@@ -10,7 +10,7 @@ const float kPi = 3.14159265358979;
 // Bits of Geometry.flags.
 const uint kQuantised = 1u; // positions are four signed normalised numbers of 16 bits each
 const uint kSingleSided = 2u; // the eye does not see its back
-const uint kOfBothSides = 4u; // the mesh has double-sided surfaces too, so that rays cull none of its backs
+const uint kMixedSides = 4u; // the mesh has single- and double-sided surfaces, so that rays cull none of its backs
 
 // Bits of Material.flags.
 const uint kAlphaMask = 1u; // holes where alpha is below the cutoff

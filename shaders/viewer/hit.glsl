@@ -19,10 +19,12 @@ struct Hit {
 struct Payload {
     Hit hit;
     vec3 transmittance; // of what lies on the way of a shadow ray
-    uint seed; // of a ray that looks for the nearest surface; kShadow for a shadow ray
+    uint seed; // of a ray that looks for the nearest surface, below kJudgesBacks; kShadow for a shadow ray
 };
 
 const uint kShadow = 0xffffffffu;
+// Set in the seed of a ray that goes through unseen backs.
+const uint kJudgesBacks = 0x80000000u;
 
 struct Triangle {
     uvec3 corners;
@@ -59,7 +61,7 @@ vec3 normalToWorld(Instance instance, vec3 n) {
 }
 
 // True for an instance that turns its triangles over.
-bool mirrors(Instance instance) {
+bool flipsWinding(Instance instance) {
     return dot(cross(instance.rows[0].xyz, instance.rows[1].xyz), instance.rows[2].xyz) < 0.0;
 }
 
@@ -67,6 +69,18 @@ bool mirrors(Instance instance) {
 vec3 outwards(Instance instance, Geometry geometry, uvec3 corners) {
     vec3 a = positionOf(geometry, corners.x);
     return normalToWorld(instance, cross(positionOf(geometry, corners.y) - a, positionOf(geometry, corners.z) - a));
+}
+
+// True for the back of a single-sided surface that rays do not cull, since the mesh has double-sided surfaces too.
+bool isUnseenBack(Hit hit, vec3 direction) {
+    if (hit.instance == kNothing) {
+        return false;
+    }
+    Instance instance = frame.instances.at[hit.instance];
+    Geometry geometry = frame.geometries.at[instance.firstGeometry + hit.geometry];
+    const uint mixed = kSingleSided | kMixedSides;
+    uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
+    return (geometry.flags & mixed) == mixed && dot(outwards(instance, geometry, corners), direction) > 0.0;
 }
 
 vec3 weightsOf(vec2 barycentrics) {

@@ -5,11 +5,10 @@
 
 #include "common/ray_offset.glsl"
 #include "viewer/lights.glsl"
+#include "viewer/nearest_ray.glsl"
 
 // Surfaces of a path before chance may end it.
 const uint kSureBounces = 3u;
-// Backs that a ray from the eye goes through at most.
-const uint kMostBacks = 32u;
 // Least density per solid angle of a direction in which a scattered ray finds lights that are near; the including file may define
 // another. Shadow rays have all of their light that comes from others.
 #ifndef LEAST_DENSITY
@@ -84,36 +83,10 @@ void storePath(uint place, Path path, Random random) {
     frame.paths.at[place].pair = random.pair;
 }
 
-// True for a back that the eye does not see though rays do not cull it, since its mesh has double-sided surfaces too.
-bool isUnseenBack(Hit hit, vec3 direction) {
-    if (hit.instance == kNothing) {
-        return false;
-    }
-    Instance instance = frame.instances.at[hit.instance];
-    Geometry geometry = frame.geometries.at[instance.firstGeometry + hit.geometry];
-    const uint both = kSingleSided | kOfBothSides;
-    return (geometry.flags & both) == both && dot(outwards(instance, geometry, CornerArray(geometry.indices).at[hit.primitive]), direction) > 0.0;
-}
-
 // The next surface on the way of a path, up to `range` away; at that distance where there is none.
 Hit nextHit(inout Path path, float range, Random random) {
-    uint seed = hashWords(random.seed + path.bounce, random.number);
-    bool isFromEye = path.bounce == 0u;
-    uint flags = isFromEye ? LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES : LVK_RAY_FLAG_NONE;
-    vec3 origin = path.origin;
-    float before = 0.0;
-    Hit hit;
-    for (uint layer = 0u; layer < kMostBacks; ++layer) {
-        path.rayCount += 1u;
-        hit = traceWithin(origin, path.direction, range - before, seed, flags);
-        hit.distance += before;
-        if (!isFromEye || !isUnseenBack(hit, path.direction)) {
-            break;
-        }
-        origin = leaveSurface(path.origin + hit.distance * path.direction, path.direction, frame.offsetExtent);
-        before = dot(origin - path.origin, path.direction);
-    }
-    return hit;
+    uint number = hashWords(random.seed + path.bounce, random.number);
+    return nearestHit(path.origin, path.direction, range, number, path.bounce == 0u, path.rayCount);
 }
 
 // The surface at a hit. The path loses what the volume before it takes.

@@ -3,6 +3,7 @@
 
 #define LVK_COUNT_TRAVERSAL_STEPS
 #include "viewer/trace_query.glsl"
+#include "viewer/nearest_ray.glsl"
 #include "viewer/plane.glsl"
 
 // Steps that are white.
@@ -19,7 +20,8 @@ vec3 heat(float share) {
 
 void stepsPixel(uvec2 pixel) {
     lvkTraversalSteps = 0u;
-    traceWithin(frame.camera.eye, cameraDirection(frame.camera, pixel), 1e30, 0u, LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES);
+    uint rayCount = 0u;
+    nearestHit(frame.camera.eye, cameraDirection(frame.camera, pixel), 1e30, 0u, true, rayCount);
     // Few steps and many differ by orders of magnitude.
     float share = log2(1.0 + float(lvkTraversalSteps)) / log2(1.0 + kMostSteps);
     frame.planes.at[planePlace(kPlaneShown, pixelPlace(ivec2(pixel)))] = vec4(heat(share), 1.0);

@@ -18,6 +18,7 @@ const float kMostChangedFrames = 3.0;
 const float kMostErrors = 2.5;
 const float kLeastChange = 0.03; // of the light
 const int kNearbyPixels = 2;
+const float kFewestNearby = 4.0; // samples there that say enough
 // While it stands.
 const float kMostStillSamples = 65536.0;
 // Samples before the variance over time says enough.
@@ -72,9 +73,6 @@ Nearby nearbyLight(ivec2 pixel, ivec2 before, Seen seen) {
     return nearby;
 }
 
-// Fewest samples around a pixel that say whether light has changed.
-const float kFewestNearby = 4.0;
-
 // True for matte and mirrored light that has changed: the mean around a pixel differs by more than noise and rounding do.
 bvec2 hasChanged(Nearby nearby) {
     float count = max(nearby.count, 1.0);
@@ -104,10 +102,10 @@ float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 p
 // hardly any of the nearest four did, of the nearest nine: what is covered by chance shows a pixel one surface now and another one then.
 History historyAt(vec2 place, Seen seen, vec3 point) {
     History sum = kNoHistory;
-    Corners corners = cornersAt(place);
+    Taps taps = tapsAt(place);
     float total = 0.0;
     for (int number = 0; number < 4; ++number) {
-        total += addHistory(sum, cornerPixel(corners, number), cornerWeight(corners, number), seen, point);
+        total += addHistory(sum, tapPixel(taps, number), tapWeight(taps, number), seen, point);
     }
     if (total <= kLeastShare) {
         sum = kNoHistory;
@@ -148,11 +146,11 @@ void temporalPixel(uvec2 at) {
         vec2 from = vec2(pixel) + 0.5 - motionOf(point, before);
         history = historyAt(from, seen, before);
         if (frame.sceneMoves != 0u && history.matte.a > 0.0) {
-            float ofTurn = samplesIn(max(kMostTurn / max(beforeAndTurn.w, 1e-6), kLeastTurnFrames));
-            float ofChange = min(ofTurn, samplesIn(kMostChangedFrames));
+            float ofRotation = samplesIn(max(kMostTurn / max(beforeAndTurn.w, 1e-6), kLeastTurnFrames));
+            float ofChange = min(ofRotation, samplesIn(kMostChangedFrames));
             bvec2 changed = hasChanged(nearbyLight(pixel, ivec2(floor(from)), seen));
-            mostMatte = min(mostMatte, changed.x ? ofChange : ofTurn);
-            mostMirrored = min(mostMirrored, changed.y ? ofChange : ofTurn);
+            mostMatte = min(mostMatte, changed.x ? ofChange : ofRotation);
+            mostMirrored = min(mostMirrored, changed.y ? ofChange : ofRotation);
         }
     }
     bool isStill = frame.stillCount > 0u;

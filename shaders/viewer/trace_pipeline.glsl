@@ -6,9 +6,9 @@
 
 layout(location = 0) rayPayloadEXT Payload payload;
 
-// The nearest surface up to `range` away, at the distance `range` where there is none.
+// The nearest surface up to `range` away, at the distance `range` where there is none. `flags`: of the ray.
 Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed, uint flags) {
-    payload.seed = seed == kShadow ? 0u : seed;
+    payload.seed = seed;
     payload.hit.distance = range;
     traceRayEXT(kTLAS[frame.tlas], flags, 0xffu, 0, 0, 0, origin, 0.0, direction, range, 0);
     return payload.hit;

@@ -23,9 +23,9 @@ void judgeCandidate(LvkRayQueryParameter query) {
     }
 }
 
-// The nearest surface up to `range` away, at the distance `range` where there is none.
+// The nearest surface up to `range` away, at the distance `range` where there is none. `flags`: of the ray.
 Hit traceWithin(vec3 origin, vec3 direction, float range, uint seed, uint flags) {
-    payload.seed = seed == kShadow ? 0u : seed;
+    payload.seed = seed;
     LvkRayQuery query;
     lvkRayQueryInitialize(query, frame.tlas, flags, 0xffu, origin, 0.0, direction, range);
     while (lvkRayQueryProceed(query)) {

@@ -11,12 +11,12 @@ void main() {
     uvec2 pixel = uvec2(gl_FragCoord.xy);
     Instance instance = frame.instances.at[inTriangle.x];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + argument];
-    if ((geometry.flags & kSingleSided) != 0u && gl_FrontFacing == mirrors(instance)) {
+    if ((geometry.flags & kSingleSided) != 0u && gl_FrontFacing == flipsWinding(instance)) {
         discard;
     }
     if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend)) != 0u) {
         Payload payload;
-        payload.seed = hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)) & 0x7fffffffu;
+        payload.seed = hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)) >> 2;
         Hit hit = Hit(inTriangle.x, argument, inTriangle.y, inBarycentrics, 0.0);
         if (passesThrough(hit, cameraDirection(frame.camera, pixel), payload)) {
             discard;

@@ -1,5 +1,5 @@
-// The light of what each pixel shows, of one sample: a shadow ray, and a path in a direction that the surface prefers, which may end with
-// the light of the radiance cache. Matte layers and all others are kept apart, without their colours, for the filter.
+// The light of what pixels show whose turn it is, of one sample: a shadow ray, and a path in a direction that the surface prefers, which may
+// end with the light of the radiance cache. Matte layers and all others are kept apart, without their colours, for the filter.
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 

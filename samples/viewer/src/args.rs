@@ -79,7 +79,7 @@ pub struct ViewerArgs {
     pub indirect: IndirectLight,
 
     /// Pixels that find light in each frame of the hybrid method: all, or one of each 2 x 2 by turns and those that the frame before did not
-    /// see. Each then has about a fourth of the samples
+    /// see. Each then has about a quarter of the samples
     #[arg(long, value_enum, default_value_t = LightRate::default())]
     pub light_rate: LightRate,
 

@@ -74,7 +74,7 @@ pub enum LightRate {
     /// All.
     #[default]
     Full,
-    /// One of each 2 x 2 by turns, and those of which the frames before know nothing. All others have the mean of their samples in the
+    /// One of each 2 x 2 by turns, those of which the frames before know nothing, and those whose paths update the radiance cache. All others have the mean of their samples in the
     /// frames before.
     Quarter,
 }

@@ -90,7 +90,7 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig, counts
     if config.method == Method::Hybrid {
         egui::ComboBox::from_label("view").selected_text(format!("{:?}", config.content)).show_ui(ui, |ui| {
             for content in Content::value_variants() {
-                // Without them all is black.
+                // Where the device counts no steps, their view is black.
                 let is_enabled = counts_steps || *content != Content::Steps;
                 let name = format!("{content:?}");
                 ui.add_enabled_ui(is_enabled, |ui| ui.selectable_value(&mut config.content, *content, name))

@@ -295,13 +295,13 @@ impl Viewer {
         config.check(self.ctx.capabilities())?;
         let before = &self.config;
         let is_resized = config.extent() != before.extent();
-        let counts_steps = |config: &ViewerConfig| config.content == Content::Steps;
+        let is_of_steps = |config: &ViewerConfig| config.content == Content::Steps;
         let needs_others = config.method != before.method
             || config.path != before.path
             || config.rasterises() != before.rasterises()
             || config.indirect != before.indirect
             || config.cache_entries != before.cache_entries
-            || counts_steps(config) != counts_steps(before);
+            || is_of_steps(config) != is_of_steps(before);
         let occludes = config.occludes(self.counts().1);
         if is_resized || needs_others {
             let renderer = Renderer::new(&self.ctx, config, occludes)?;
@@ -315,7 +315,7 @@ impl Viewer {
             self.done = 0;
         }
         // The samples of a pixel have other numbers by turns: those of one rate would come again by the other.
-        if config.light_rate != before.light_rate {
+        if config.light_turns() != before.light_turns() {
             (self.frame_number, self.done) = (0, 0);
         }
         self.config = ViewerConfig { texture_budget: before.texture_budget, ..*config };

@@ -10,7 +10,7 @@ use lvk_samples::app::run_error::RunError;
 use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::scene::Camera;
 
-use crate::config::{Method, ViewerConfig, counts_steps};
+use crate::config::{Method, ViewerConfig};
 use crate::gpu::DrawnInstances;
 #[cfg(feature = "window")]
 use crate::panel;
@@ -178,7 +178,8 @@ impl Sample for Viewer {
             self.play(animation, 0.0);
         }
         let mut config = self.config;
-        panel::show_settings(ui, &mut config, counts_steps(self.ctx.capabilities()));
+        let counts_steps = crate::config::counts_steps(self.ctx.capabilities());
+        panel::show_settings(ui, &mut config, counts_steps);
         if config != self.config {
             self.refused = self.configure(&config).err().map(|error| error.to_string());
         }

@@ -82,7 +82,7 @@ fn materials() -> [(&'static str, Material, f64); SIDE * SIDE] {
         ("brushed metal", Material { anisotropy: Some(brushed), ..metal() }, 0.03),
         ("a thin film", Material { iridescence: Some(film), ..metal() }, 0.03),
         ("a mask", through(AlphaMode::Mask { cutoff: 0.5 }, 0.4), 0.05),
-        ("a veil", through(AlphaMode::Blend, 0.4), 0.2),
+        ("a veil", through(AlphaMode::Blend, 0.4), 0.25),
     ]
 }
 

@@ -46,14 +46,23 @@ fn row() -> (Model, Vec<(&'static str, bool)>) {
         ("a back in a mesh with double-sided surfaces", &single, false, None, false),
         ("a double-sided back in that mesh", &double, false, None, true),
         ("a front in that mesh", &single, true, None, true),
+        ("a front in the place of a back in that mesh", &single, true, None, true),
+        ("a back in the place of a front in that mesh", &single, false, None, true),
     ];
     let middle = 0.5 * (squares.len() as f32 - 1.0);
     let mut builder = Builder::default();
+    let corner = |x: f32| Vec3::new(x - 0.4, -0.4, 0.0);
+    let sides = |faces_eye: bool| if faces_eye { [Vec3::X, Vec3::Y] } else { [Vec3::Y, Vec3::X] };
     for (place, (_, material, faces_eye, transform, _)) in squares.iter().enumerate() {
         let across = if transform.is_some_and(|transform| transform.x_axis.x < 0.0) { -1.0 } else { 1.0 };
-        let corner = Vec3::new(across * (place as f32 - middle) - 0.4, -0.4, 0.0);
-        let [u, v] = if *faces_eye { [Vec3::X, Vec3::Y] } else { [Vec3::Y, Vec3::X] };
-        builder = builder.quad(corner, 0.8 * u, 0.8 * v, (*material).clone());
+        let [u, v] = sides(*faces_eye);
+        builder =
+            builder.quad(corner(across * (place as f32 - middle)), 0.8 * u, 0.8 * v, (*material).clone());
+    }
+    // The other sides of the last two squares.
+    for (place, faces_eye) in [(squares.len() - 2, false), (squares.len() - 1, true)] {
+        let [u, v] = sides(faces_eye);
+        builder = builder.quad(corner(place as f32 - middle), 0.8 * u, 0.8 * v, single.clone());
     }
     let mut model = builder.model();
     for (node, (.., transform, _)) in model.nodes.iter_mut().zip(&squares) {
@@ -62,8 +71,8 @@ fn row() -> (Model, Vec<(&'static str, bool)>) {
         }
     }
     // The last squares become one mesh.
-    let first = squares.len() - 3;
-    for place in [first + 1, first + 2] {
+    let first = squares.len() - 5;
+    for place in first + 1..model.meshes.len() {
         let primitives = std::mem::take(&mut model.meshes[place].primitives);
         model.meshes[first].primitives.extend(primitives);
         model.nodes[place].mesh = None;

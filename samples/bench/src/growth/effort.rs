@@ -45,6 +45,11 @@ impl Effort {
     }
 }
 
+/// Returns those of all samples of [`Effort::median`] that count: not the first, unless it is the only one.
+pub(super) fn counted<T>(samples: &[T]) -> &[T] {
+    if samples.len() > 1 { &samples[1..] } else { samples }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

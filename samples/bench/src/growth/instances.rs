@@ -10,7 +10,7 @@ use lvk::{
 
 use super::backends::Backend;
 use super::curve::{Curve, Expected, Unit};
-use super::effort::Effort;
+use super::effort::{Effort, counted};
 use super::group::{Group, GroupKey};
 use super::terrain::terrain;
 use crate::error::BenchError;
@@ -103,7 +103,7 @@ fn costs(
     let one = moved(middle..middle + 1, BuildMode::Refit, Until::Done)?;
     let all = moved(0..count, BuildMode::Rebuild, Until::Done)?;
     let cpu = moved(0..count, BuildMode::Rebuild, Until::Submitted)?;
-    Ok([built, one, all, cpu, trace, median_of(&gpu_times, |ms| *ms)])
+    Ok([built, one, all, cpu, trace, median_of(counted(&gpu_times), |ms| *ms)])
 }
 
 /// The end of a measured time.

@@ -13,7 +13,7 @@ use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
 use super::emitters::{EmissiveMeshes, emission_color, emission_weight};
 use super::instances::MeshKey;
 use super::layout::{GpuAttributes, GpuGeometry, geometry_flag};
-use super::materials::is_single_sided;
+use super::materials::{is_single_sided, is_thin, transmission};
 use super::vertices::{PackedPositions, attributes};
 use crate::model::{moved, movers};
 
@@ -71,8 +71,8 @@ struct Part {
     material: u32,
     is_opaque: bool,
     is_single_sided: bool,
-    /// True if the mesh has double-sided primitives too.
-    is_of_both_sides: bool,
+    /// True if the mesh has single- and double-sided primitives.
+    has_mixed_sides: bool,
     /// Luminance of its light, if shadow rays look for it.
     emission_weight: f32,
 }
@@ -95,8 +95,8 @@ impl Arena {
         let own = &mut self.parts[before..];
         // Rays cull all backs of an instance or none.
         let has_singles = own.iter().any(|part| part.is_single_sided);
-        let is_of_both_sides = has_singles && own.iter().any(|part| !part.is_single_sided);
-        own.iter_mut().for_each(|part| part.is_of_both_sides = is_of_both_sides);
+        let has_mixed_sides = has_singles && own.iter().any(|part| !part.is_single_sided);
+        own.iter_mut().for_each(|part| part.has_mixed_sides = has_mixed_sides);
         own.len()
     }
 
@@ -121,7 +121,7 @@ impl Arena {
             material: number,
             is_opaque: is_opaque(material),
             is_single_sided: is_single_sided(material),
-            is_of_both_sides: false,
+            has_mixed_sides: false,
         });
         *position_count += vertex_count;
         self.vertex_count += vertex_count;
@@ -135,7 +135,7 @@ impl Part {
         let set = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
         set(self.is_quantised, geometry_flag::QUANTISED)
             | set(self.is_single_sided, geometry_flag::SINGLE_SIDED)
-            | set(self.is_of_both_sides, geometry_flag::OF_BOTH_SIDES)
+            | set(self.has_mixed_sides, geometry_flag::MIXED_SIDES)
     }
 }
 
@@ -424,9 +424,7 @@ fn batches<'a, T>(mut list: &'a [T], mut sizes: &[usize]) -> Vec<&'a [T]> {
 
 /// True if no ray goes on behind a surface of the material without a bend.
 fn is_opaque(material: &Material) -> bool {
-    let is_thin = material.volume.as_ref().is_none_or(|volume| volume.thickness <= 0.0);
-    let is_pane =
-        is_thin && material.transmission.as_ref().is_some_and(|transmission| transmission.factor > 0.0);
+    let is_pane = is_thin(material) && transmission(material) > 0.0;
     material.alpha_mode == AlphaMode::Opaque && !is_pane
 }
 

@@ -1,4 +1,4 @@
-//! Features of a model that the viewer ignores.
+//! Features of a model that the viewer ignores, or shows otherwise.
 
 use lvk_gltf::{Model, Projection};
 

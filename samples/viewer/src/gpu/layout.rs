@@ -15,7 +15,7 @@ pub(crate) mod geometry_flag {
     /// Positions are `Snorm16x4`.
     pub(crate) const QUANTISED: u32 = 1;
     pub(crate) const SINGLE_SIDED: u32 = 2;
-    pub(crate) const OF_BOTH_SIDES: u32 = 4;
+    pub(crate) const MIXED_SIDES: u32 = 4;
 }
 
 /// Bits of `Material.flags`.

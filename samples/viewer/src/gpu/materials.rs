@@ -138,12 +138,13 @@ pub(super) fn is_single_sided(material: &Material) -> bool {
     !material.double_sided && (is_thin(material) || transmission(material) == 0.0)
 }
 
-fn is_thin(material: &Material) -> bool {
+/// True if there is no volume behind the surface.
+pub(super) fn is_thin(material: &Material) -> bool {
     material.volume.as_ref().is_none_or(|volume| volume.thickness <= 0.0)
 }
 
 /// A dielectric whose index of refraction is 0 reflects everything, so that nothing passes.
-fn transmission(material: &Material) -> f32 {
+pub(super) fn transmission(material: &Material) -> f32 {
     let factor = material.transmission.as_ref().map_or(0.0, |transmission| transmission.factor);
     if material.ior < 1.0 { 0.0 } else { factor }
 }
