@@ -26,6 +26,11 @@ const uint kShadow = 0xffffffffu;
 // Set in the seed of a ray that goes through unseen backs.
 const uint kJudgesBacks = 0x80000000u;
 
+// The seed of a ray that looks for the nearest surface, below kJudgesBacks, and not kShadow with it.
+uint nearestSeed(uint random) {
+    return random >> 2;
+}
+
 struct Triangle {
     uvec3 corners;
     uint geometry; // in the list of all

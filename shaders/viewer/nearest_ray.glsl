@@ -8,7 +8,7 @@
 // surface. Where it meets one all the same, it is traced once more, and judges all triangles on its way one by one. `random`: by which
 // surfaces are met that cover a share of light. `rayCount`: grows by the rays traced.
 Hit nearestHit(vec3 origin, vec3 direction, float range, uint random, bool isFromEye, inout uint rayCount) {
-    uint seed = random >> 2;
+    uint seed = nearestSeed(random);
     uint flags = isFromEye ? LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES : LVK_RAY_FLAG_NONE;
     Hit hit;
     bool isDone = false;

@@ -16,7 +16,7 @@ void main() {
     }
     if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend)) != 0u) {
         Payload payload;
-        payload.seed = hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)) >> 2;
+        payload.seed = nearestSeed(hashWords(randomOf(pixel, 0u).seed, firstSample(pixel)));
         Hit hit = Hit(inTriangle.x, argument, inTriangle.y, inBarycentrics, 0.0);
         if (passesThrough(hit, cameraDirection(frame.camera, pixel), payload)) {
             discard;

@@ -74,8 +74,8 @@ pub enum LightRate {
     /// All.
     #[default]
     Full,
-    /// One of each 2 x 2 by turns, those of which the frames before know nothing, and those whose paths update the radiance cache. All others have the mean of their samples in the
-    /// frames before.
+    /// One of each 2 x 2 by turns, those of which the frames before know nothing, and those whose paths update the radiance cache. All
+    /// others have the mean of their samples in the frames before.
     Quarter,
 }
 

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use glam::{Mat4, Quat, Vec3};
 use lvk::Context;
 use lvk_gltf::{
-    ColorSpace, Image, ImageData, Material, MipLevel, Model, Node, Positions, Sampler, TexelFormat,
-    TextureRef, TextureTransform, Transform, Trs,
+    ImageData, Material, MipLevel, Model, Node, Positions, TexelFormat, TextureRef, TextureTransform,
+    Transform, Trs,
 };
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
@@ -94,13 +94,10 @@ fn transforms_of_textures_are_those_of_coordinates() {
     let textured = |transform| {
         let texture = TextureRef { image: 0, sampler: 0, tex_coord: 0, transform };
         let material = Material { base_color_texture: Some(texture), ..matte([1.0; 3]) };
-        let mut model = Builder::default()
+        Builder::default()
             .quad(Vec3::new(-2.0, -0.5, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, material)
-            .model();
-        model.images =
-            vec![Image { name: None, source: 0, color_space: ColorSpace::Srgb, data: data.clone() }];
-        model.samplers = vec![Sampler::default()];
-        model
+            .image(&data)
+            .model()
     };
     let by_texture = textured(Some(transform));
     let mut by_coordinates = textured(None);

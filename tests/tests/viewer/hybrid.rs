@@ -6,10 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use image::RgbaImage;
 use lvk::{Context, RayQueryPath};
-use lvk_gltf::{
-    ColorSpace, Image, ImageData, Material, MipLevel, Model, Sampler, TexelFormat, TextureRef,
-    TextureTransform,
-};
+use lvk_gltf::{ImageData, Material, MipLevel, Model, TexelFormat, TextureRef, TextureTransform};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::Sample as _;
 use lvk_samples::hybrid::RayPath;
@@ -38,6 +35,11 @@ fn view(samples: u32) -> View {
 fn picture(ctx: &Context, method: Method, model: &Model, view: &View) -> RgbaImage {
     let mut viewer = viewer(ctx, (method, RayPath::Query), model, &environment(), view);
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(&mut viewer).unwrap()).unwrap()
+}
+
+/// A matte floor that fills the pictures of it.
+fn broad_floor(color: [f32; 3]) -> Builder {
+    Builder::default().quad(Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0, matte(color))
 }
 
 #[test]
@@ -129,12 +131,7 @@ fn a_still_begins_anew_at_another_rate() {
 #[test]
 fn views_of_light_show_what_surfaces_receive() {
     let Some(ctx) = software_device() else { return };
-    let floor = Builder::default().quad(
-        Vec3::new(-50.0, 0.0, 50.0),
-        Vec3::X * 100.0,
-        Vec3::NEG_Z * 100.0,
-        matte([0.2, 0.5, 0.8]),
-    );
+    let floor = broad_floor([0.2, 0.5, 0.8]);
     let (model, sky) = (floor.model(), Environment::uniform([1.0, 2.0, 3.0]));
     let view =
         View { camera: Camera::looking_at([0.0, 2.0, 0.5], [0.0; 3], 40.0), size: [24, 16], samples: 64 };
@@ -159,10 +156,8 @@ fn mips_are_those_of_the_set_of_texture_coordinates() {
         let floor = Material { unlit: true, base_color_texture: Some(texture), ..matte([1.0; 3]) };
         let mut model = Builder::default()
             .quad(Vec3::new(-10.0, 0.0, 10.0), Vec3::X * 20.0, Vec3::NEG_Z * 20.0, floor)
+            .image(&data)
             .model();
-        model.images =
-            vec![Image { name: None, source: 0, color_space: ColorSpace::Srgb, data: data.clone() }];
-        model.samplers = vec![Sampler::default()];
         if tex_coord == 1 {
             // The first set has the same texels everywhere.
             model.meshes[0].primitives[0].tex_coords.insert(0, vec![[0.0; 2]; 4]);
@@ -178,12 +173,7 @@ fn mips_are_those_of_the_set_of_texture_coordinates() {
 #[test]
 fn dark_surfaces_in_bright_exposure_keep_their_light() {
     let Some(ctx) = software_device() else { return };
-    let floor = Builder::default().quad(
-        Vec3::new(-50.0, 0.0, 50.0),
-        Vec3::X * 100.0,
-        Vec3::NEG_Z * 100.0,
-        matte([0.02; 3]),
-    );
+    let floor = broad_floor([0.02; 3]);
     let (model, down) = (floor.model(), Camera::looking_at([0.0, 2.0, 0.5], [0.0, 0.0, 0.0], 40.0));
     let shown = |method, samples| {
         let view = View { camera: down, size: [24, 16], samples };
@@ -224,12 +214,11 @@ fn the_smallest_mip_of_an_image_of_odd_sides_has_its_light() {
     let often = TextureTransform { offset: [0.0; 2], rotation: 0.0, scale: [400.0; 2] };
     let texture = TextureRef { image: 0, sampler: 0, tex_coord: 0, transform: Some(often) };
     let floor = Material { base_color_texture: Some(texture), ..matte([1.0; 3]) };
-    let mut model = Builder::default()
+    let model = Builder::default()
         .quad(Vec3::new(-10.0, 0.0, 20.0), Vec3::X * 20.0, Vec3::NEG_Z * 20.0, floor)
         .quad(Vec3::new(-10.0, 0.0, 0.0), Vec3::X * 20.0, Vec3::Y * 4.0, matte([0.8; 3]))
+        .image(&data)
         .model();
-    model.images = vec![Image { name: None, source: 0, color_space: ColorSpace::Srgb, data }];
-    model.samplers = vec![Sampler::default()];
     // The sun stands behind the wall: it shines on the floor, and not on the wall.
     let behind = SunSetting { elevation_degrees: 60.0, azimuth_degrees: 180.0, ..SunSetting::default() };
     let environment = Environment { sun: Environment::day(&behind).sun, ..Environment::uniform([0.0; 3]) };

@@ -1,9 +1,14 @@
 //! Models of a few triangles, and what the viewer makes of them.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::sync::Arc;
+
 use glam::{Mat4, Vec3};
 use lvk::Context;
-use lvk_gltf::{Light, Material, Mesh, Model, Node, Positions, Primitive, Specular, Transform};
+use lvk_gltf::{
+    ColorSpace, Image, ImageData, Light, Material, Mesh, Model, Node, Positions, Primitive, Sampler,
+    Specular, Transform,
+};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::Sample as _;
 use lvk_samples::hybrid::RayPath;
@@ -61,6 +66,14 @@ impl Builder {
         };
         self.model.meshes.push(Mesh { primitives: vec![primitive], ..Mesh::default() });
         self.model.nodes.push(Node { mesh: Some(self.model.meshes.len() - 1), ..Node::default() });
+        self
+    }
+
+    /// Adds an image in sRGB, whose number is 0, and the usual sampler.
+    pub fn image(mut self, data: &Arc<ImageData>) -> Self {
+        let data = Arc::clone(data);
+        self.model.images = vec![Image { name: None, source: 0, color_space: ColorSpace::Srgb, data }];
+        self.model.samplers = vec![Sampler::default()];
         self
     }
 

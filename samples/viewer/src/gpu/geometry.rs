@@ -12,7 +12,7 @@ use lvk_gltf::{AlphaMode, Bounds, Material, Model, Pose, Primitive};
 use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
 use super::emitters::{EmissiveMeshes, emission_color, emission_weight};
 use super::instances::MeshKey;
-use super::layout::{GpuAttributes, GpuGeometry, geometry_flag};
+use super::layout::{GpuAttributes, GpuGeometry, flag_if, geometry_flag};
 use super::materials::{is_single_sided, is_thin, transmission};
 use super::vertices::{PackedPositions, attributes};
 use crate::model::{moved, movers};
@@ -132,10 +132,9 @@ impl Arena {
 impl Part {
     /// Bits of `Geometry.flags`.
     fn flags(&self) -> u32 {
-        let set = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
-        set(self.is_quantised, geometry_flag::QUANTISED)
-            | set(self.is_single_sided, geometry_flag::SINGLE_SIDED)
-            | set(self.has_mixed_sides, geometry_flag::MIXED_SIDES)
+        flag_if(self.is_quantised, geometry_flag::QUANTISED)
+            | flag_if(self.is_single_sided, geometry_flag::SINGLE_SIDED)
+            | flag_if(self.has_mixed_sides, geometry_flag::MIXED_SIDES)
     }
 }
 

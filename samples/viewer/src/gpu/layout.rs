@@ -10,6 +10,11 @@ pub(crate) const NO_TEXTURE: u32 = u32::MAX;
 /// Surfaces of a path at most that update the radiance cache (`kMostUpdates`).
 const MOST_UPDATES: usize = 4;
 
+/// A bit of flags, if it is set.
+pub(crate) fn flag_if(is_set: bool, flag: u32) -> u32 {
+    if is_set { flag } else { 0 }
+}
+
 /// Bits of `Geometry.flags`.
 pub(crate) mod geometry_flag {
     /// Positions are `Snorm16x4`.

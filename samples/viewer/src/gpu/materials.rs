@@ -3,7 +3,7 @@
 use glam::{Mat2, Vec2, Vec3};
 use lvk_gltf::{AlphaMode, Iridescence, Material, Model, TextureRef, TextureTransform};
 
-use super::layout::{GpuMaterial, GpuTextureSlot, NO_TEXTURE, material_flag, slot};
+use super::layout::{GpuMaterial, GpuTextureSlot, NO_TEXTURE, flag_if, material_flag, slot};
 use super::textures::GpuTextures;
 
 /// Materials and the texture slots that they name.
@@ -165,12 +165,11 @@ fn flags(material: &Material) -> u32 {
         AlphaMode::Mask { .. } => material_flag::ALPHA_MASK,
         AlphaMode::Blend => material_flag::ALPHA_BLEND,
     };
-    let set = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     alpha
-        | set(material.unlit, material_flag::UNLIT)
-        | set(is_thin(material), material_flag::THIN)
-        | set(has_tangents(material), material_flag::TANGENTS)
-        | set(has_extensions(material), material_flag::EXTENSIONS)
+        | flag_if(material.unlit, material_flag::UNLIT)
+        | flag_if(is_thin(material), material_flag::THIN)
+        | flag_if(has_tangents(material), material_flag::TANGENTS)
+        | flag_if(has_extensions(material), material_flag::EXTENSIONS)
 }
 
 /// True if the surface needs more than its base colour, metalness, roughness, emission, normals and anisotropy.
